@@ -29,7 +29,8 @@ WHEELS ?=
 WINDOWS := x86_64-pc-windows-gnu
 BUILT_FOR_WINDOWS := $(CURDIR)/target/windows
 IN_WINE := env -u STEPWELL_TESTS WINEPREFIX=$(CURDIR)/.venv/wine WINEDEBUG=-all WINEDLLOVERRIDES=mscoree,mshtml= \
-           OPENBLAS_NUM_THREADS=1 CARGO_TARGET_DIR=$(BUILT_FOR_WINDOWS) CARGO_TARGET_X86_64_PC_WINDOWS_GNU_RUNNER=wine
+           OPENBLAS_NUM_THREADS=1 CARGO_TARGET_DIR=$(BUILT_FOR_WINDOWS) \
+           CARGO_TARGET_X86_64_PC_WINDOWS_GNU_RUNNER="$(CURDIR)/$(BIN)/python $(CURDIR)/tests/windows/piped.py"
 # What is tested by an interpreter for Windows: the bits, files, the console, Ctrl-C. How long writing a kernel takes is not: other
 # tests run meanwhile.
 TESTS_ON_WINDOWS := windows recorded_bits kernels fixed saved_runs output cli interrupt package

@@ -86,9 +86,11 @@ def cloth(springs: int, floor: bool) -> tuple[sw.Springs, Any]:
 
 
 class Exported:
-    """An exported cloth in a process of its own."""
+    """An exported cloth, or another system of places, in a process of its own, timed by this clock of C."""
 
-    def __init__(self, system: sw.Springs, at: Any, method: str, language: str, folder: Path) -> None:
+    def __init__(
+        self, system: sw.System, at: Any, method: str, language: str, folder: Path, clock: str = "CLOCK_MONOTONIC"
+    ) -> None:
         begin = time.perf_counter()
         step = sw.export(system, method, cast("Any", language), dt=DT, v=0.0 * at, y=at, name="cloth")
         self.export, self.compile = time.perf_counter() - begin, 0.0
@@ -97,7 +99,8 @@ class Exported:
         command = ["node", "main.mjs"]
         text, ending = (C, ".c") if language == "c" else (JAVASCRIPT, ".mjs")
         (folder / f"cloth{ending}").write_text(step.source, encoding="utf-8")
-        (folder / f"main{ending}").write_text(text.replace("NUMBERS", str(at.size)), encoding="utf-8")
+        text = text.replace("NUMBERS", str(at.size)).replace("CLOCK_MONOTONIC", clock)
+        (folder / f"main{ending}").write_text(text, encoding="utf-8")
         if language == "c":
             begin = time.perf_counter()
             subprocess.run(["cc", *FLAGS, "main.c", "-lm", "-o", "main"], cwd=folder, check=True)

@@ -29,17 +29,21 @@ from stepwell.runs import engine
 from .compare.machine import describe
 from .compare.peers import c_peer
 from .compile import SYSTEMS, arithmetic
+from .export import Exported
 
 HERE = Path(__file__).resolve().parent
 NUMBERS, IMAGES = HERE / "growth.json", HERE.parent / "docs" / "images"
 
 #: The largest of each sweep, in full and quickly, and the seconds after which a measurement is not repeated.
 LARGEST = {"members": (10**7, 10**5), "states": (500, 200), "bodies": (20_000, 2000), "steps": (10**7, 10**6)}
-LARGEST |= {"operations": (10**5, 10**5)}
+LARGEST |= {"operations": (10**5, 10**5), "ring": (10**5, 10**4)}
 ENOUGH, REPEATS = 2.0, 7
 
 #: Steps of a member in the sweep of members, operations of a measurement of a limit, and members and steps of a kernel.
 STEPS, REPEATED, KERNEL_MEMBERS, KERNEL_STEPS = 100, 1_200_000, 1024, 2000
+
+#: About the operations of an oscillator of the ring, and steps of a member after which its code is packed.
+OPERATIONS_OF_ONE, PACKING_STEPS = 60, 31_000
 
 #: What is on the axes, and what the picture says.
 AXES = {
@@ -63,6 +67,11 @@ AXES = {
         "operations of a step",
         "ns per operation",
         "Tracing, compiling and stepping grow in proportion to the operations",
+    ),
+    "ring": (
+        "operations of a step",
+        "ns per operation",
+        "A step costs in proportion to its operations, however long, and less than in C",
     ),
 }
 
@@ -194,6 +203,37 @@ def operations(most: int) -> list[dict[str, Any]]:
         }
         for key in ("trace", "compile"):
             row[key] = min(1e9 * each[key] / n for each in told if each) if told[0] else None
+        rows.append(row)
+    return rows
+
+
+def ring(most: int) -> list[dict[str, Any]]:
+    """Own oscillators on a ring by Runge-Kutta 4: one member, beside its exported C program, and one of some, each of a batch."""
+
+    @sw.system
+    def coupled(t: Any, v: Any, y: Any) -> Any:
+        d = np.roll(y, 1) - y
+        pull = d + 0.1 * d * d * d
+        return pull - np.roll(pull, -1) - 0.3 * v - 0.2 * y / (1.0 + y * y)
+
+    rows = []
+    for n in ladder(4, most // OPERATIONS_OF_ONE):
+        y = np.sin(np.arange(float(n)))
+        system: sw.System = coupled()
+        model = engine.model(engine.Plan(system.for_state_shapes(y, y), sw.method("rk4"), (), 1e-3))
+        about = _core.operations(model)
+        row: dict[str, Any] = {"x": about, "form": form_of(system.for_state_shapes(y, y), "rk4")}
+        for name, members in (("one member", 1), ("one of 64", 64)):
+            count = max(50, 40_000_000 // (about * members))
+            start = np.repeat(y[:, np.newaxis], members, axis=1) if members > 1 else y
+            ask: dict[str, Any] = {"v": 0.0 * start, "y": start, "dt": 1e-3, "threads": 1}
+            sw.integrate(system, "rk4", steps=PACKING_STEPS if members == 1 else count, **ask)
+            spent = least(lambda ask=ask, count=count: sw.integrate(system, "rk4", steps=count, **ask))  # type: ignore[misc]
+            row[name] = 1e9 * spent / (count * members * about)
+        with tempfile.TemporaryDirectory() as folder:
+            program = Exported(system, y, "rk4", "c", Path(folder), "CLOCK_PROCESS_CPUTIME_ID")
+            row["exported C"] = 1e9 * min(program.seconds(count * members) for _ in range(REPEATS)) / (count * members * about)
+            program.close()
         rows.append(row)
     return rows
 
@@ -392,6 +432,7 @@ def main() -> None:
             "bodies": bodies,
             "steps": steps,
             "operations": operations,
+            "ring": ring,
         }
         chosen = [*sweeps, "kernels"] if asked.only is None else asked.only.split(",")
         with warnings.catch_warnings():

@@ -19,7 +19,7 @@ NUMBA_CPU_NAME=haswell NUMBA_CPU_FEATURES=+avx2,+fma (numba)."""
 
 HERE, OUT = Path(__file__).parents[1], Path(__file__).parents[2] / "out"
 #: For all of it, on two cores; ``python -m benches.stiff`` has the rest of half an hour.
-MINUTES = 20.0
+MINUTES = 24.0
 #: Tables besides those of the works: of adaptive steps, of own equations, of stages, and of what is besides steps.
 TABLES = 9
 
@@ -61,7 +61,7 @@ def main() -> None:
     about = "only the works that begin so, with commas between; chosen for adaptive steps, W7 for own equations, stages for a "
     about += "call; the others stay in the report as they are"
     parser.add_argument("--only", default="", metavar="W4", help=about)
-    parser.add_argument("--members", type=int, default=10_000, help="orbits with adaptive steps (default: 10 000)")
+    parser.add_argument("--members", type=int, default=1000, help="orbits with adaptive steps (default: 1000)")
     parser.add_argument("--minutes", type=float, default=MINUTES, help=f"for all of it (default: {MINUTES:g})")
     asked = parser.parse_args()
     asked.repeats = asked.repeats or (3 if asked.quick else 9)

@@ -15,8 +15,10 @@ from . import _core
 from .base import registry
 
 registry.register(
+    algebraic_lost="stepwell.analysis.consistency:lost",
     algebraic_rates="stepwell.analysis.consistency:rates",
     algebraic_start="stepwell.analysis.consistency:check_start",
+    amplified_of="stepwell.analysis.amplified:finding_of",
     animate_run="stepwell.views.charts.runs_animation:animate",
     draw_advice="stepwell.views.charts.advice_picture:draw",
     derivatives_of_rates="stepwell.analysis.derivatives.traced:of_rates",
@@ -47,8 +49,10 @@ registry.register(
     run_to_xarray="stepwell.interop.tables:to_xarray",
     safe_step="stepwell.analysis.stability.nets:safe_step",
     save_run="stepwell.interop.saving:save",
+    state_jump="stepwell.analysis.state_jumps:why_short",
+    state_jump_of="stepwell.analysis.state_jumps:finding_of",
     stiffness_of="stepwell.analysis.stiffness:finding_of",
-    watched_for_growth="stepwell.analysis.growth:watched",
+    watched="stepwell.analysis.growth:watched",
 )
 
 __version__: str = _core.__version__

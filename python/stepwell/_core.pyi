@@ -14,6 +14,7 @@ from .runs.engine import AdaptiveArrays, Arrays, CorePacing, Plan
 
 __all__ = [
     "Equations",
+    "Evaluation",
     "ModelSpec",
     "Prepared",
     "PreparedAdaptive",
@@ -22,6 +23,7 @@ __all__ = [
     "World",
     "__version__",
     "adapt",
+    "adapt_and_look",
     "ask",
     "catalogue",
     "check",
@@ -39,6 +41,7 @@ __all__ = [
     "program",
     "recorded",
     "run",
+    "run_and_look",
     "series_evaluations",
     "sound",
     "stages",
@@ -98,7 +101,7 @@ class ModelSpec:
         fused: bool = False,
         order: int = 0,
         single: bool = False,
-        acceptance: tuple[tuple[int, ...], bool, tuple[int, ...]] | None = None,
+        acceptance: tuple[tuple[int, ...], bool, tuple[int, ...], bool] | None = None,
         backward: bool = False,
     ) -> ModelSpec: ...
     @property
@@ -157,7 +160,9 @@ class World:
         carry: NDArray[Any] | None = None,
         force: NDArray[Any] | None = None,
     ) -> World: ...
-    def step(self, n: int = 1) -> None: ...
+    def step(self, n: int = 1) -> bool:
+        """Make steps; whether a number of the state is not finite then, if that was looked at."""
+
     def carry(self) -> NDArray[Any] | None: ...
     def carry_on(self, carry: NDArray[Any]) -> None:
         """Go on with this carry, by rows, which belongs to what is in the arrays now."""
@@ -250,6 +255,15 @@ class Symbol:
 
 #: A symbol, or a number that becomes one.
 _Value = Symbol | float
+#: One number for all members, or one for each.
+_Row = NDArray[np.float64] | float
+
+@final
+class Evaluation:
+    """Values of a tape for many members at once."""
+
+    def __call__(self, members: int, state: list[_Row], parameters: list[_Row]) -> NDArray[np.float64]:
+        """A row for each value, from rows of the state and of the parameters."""
 
 @final
 class Tape:
@@ -291,22 +305,28 @@ class Tape:
         dy: list[Symbol] | None = None,
         quantities: list[tuple[str, Symbol]] = ...,
         kept: tuple[Symbol, list[Symbol], list[Symbol], Symbol] | None = None,
-        functions: list[tuple[Symbol, list[tuple[Symbol, Symbol]], tuple[float, float] | None]] = ...,
+        functions: list[tuple[Symbol, list[tuple[Symbol, Symbol]], tuple[float, float] | None, bool]] = ...,
         mass: list[list[tuple[int, float]]] | None = None,
         friction: tuple[list[Symbol], int, tuple[int, list[Symbol]] | None] | None = None,
     ) -> Equations:
         """These values as the rates of a system; without ``dy``, ẏ is v.
 
-        ``functions`` are values with, for each that they depend on, the derivative by it; and, of one branch of several, its
-        bounds. ``mass`` is the mass matrix: of each row the columns and entries that are not zero. ``friction`` that sticks has
-        its decelerations, the length of the vectors that it acts on, and, if it acts on one number, its place and by how much
-        others change with it.
+        ``functions`` are values with, for each that they depend on, the derivative by it; of one branch of several, its bounds;
+        and whether they are made of pieces. ``mass`` is the mass matrix: of each row the columns and entries that are not zero.
+        ``friction`` that sticks has its decelerations, the length of the vectors that it acts on, and, if it acts on one number,
+        its place and by how much others change with it.
 
         ``kept`` is an invariant that a projection keeps: its value, its derivatives by v and by y, the square of their length.
         """
 
     def fused(self, of: list[Symbol]) -> tuple[Tape, list[Symbol]]:
         """A tape with fused multiply-adds in what these values need, and the values on it."""
+
+    def evaluation(self, of: list[Symbol], states: int) -> Evaluation | None:
+        """These values for many members at once, from so many numbers of a state and from parameters.
+
+        None if they depend on a step, a time or a sampled input.
+        """
 
     def written(self, of: list[Symbol]) -> dict[str, int]:
         """How often each kind of operation was asked for in a step, if these values are its next state.
@@ -335,11 +355,19 @@ def ask(function: Callable[[], object] | None) -> None:
 def listen() -> None:
     """Raise if this thread is to stop: what the function says that it asks, and ``KeyboardInterrupt`` after Ctrl-C."""
 
+def run_and_look(model: ModelSpec, plan: Plan, arrays: Arrays, events: object) -> tuple[bool, object]:
+    """``run`` with events, of ``runs.events.by_core``: also what was found of them."""
+
 def run(model: ModelSpec, plan: Plan, arrays: Arrays) -> bool:
     """Whether some member has diverged, now or before.
 
     Of the plan it reads ``t0``, ``dt``, ``choice``, ``first``, ``steps``, ``every``, ``threads`` and ``progress``.
     """
+
+def adapt_and_look(
+    model: ModelSpec, plan: Plan, pacing: CorePacing, arrays: AdaptiveArrays, events: object
+) -> tuple[bool, object]:
+    """``adapt`` with events, of ``runs.events.by_core``: also what was found of them."""
 
 def adapt(model: ModelSpec, plan: Plan, pacing: CorePacing, arrays: AdaptiveArrays) -> bool:
     """Make a run with a tolerance. Of the plan it reads ``t0``, ``threads`` and ``progress``; of the pacing everything.

@@ -1,9 +1,5 @@
 """Bode charts: the response of each method is what a run with a sinusoid shows, and what is said of it is true."""
 
-from __future__ import annotations
-
-import csv
-import json
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +10,7 @@ from stepwell.analysis.discrete.driven import of_method
 from stepwell.errors import ArgumentError, ShapeError, UnknownNameError, UnsupportedError
 from stepwell.views.charts.bode import phase
 from stepwell.views.charts.bode_picture import finding
+from support.charted import files_of
 from support.looped import assert_refused, looped
 
 OSCILLATOR = sw.Oscillator(1.0, 0.1)
@@ -21,10 +18,8 @@ OSCILLATOR = sw.Oscillator(1.0, 0.1)
 
 @looped("method", [each.name for each in sw.methods()])
 def test_the_response_is_what_a_run_shows(method: str) -> None:
-    """A run that starts on the steady motion stays on it: at step k it is the real part of S·e^(jωk·dt), for every method.
-
-    S is the response of all states. Verlet and leapfrog see the input in what they carry, too.
-    """
+    """A run that starts on the steady motion stays on it: at step k it is the real part of S·e^(jωk·dt), for every method."""
+    # S is the response of all states. Verlet and leapfrog see the input in what they carry, too.
     system = sw.LinearSystem([[0.0, -4.0], [1.0, 0.0]], [[1.0], [0.0]])  # an undamped oscillator, which Verlet can step
     dt, omega = 0.2, np.array([0.5, 3.0, 12.0])
     states = of_method(system, sw.method(method), dt, omega)[:, :, 0]
@@ -42,7 +37,7 @@ def test_the_error_falls_with_the_order(method: str, order: int) -> None:
     assert np.log2(errors[0] / errors[1]) == pytest.approx([order] * 2, abs=0.2)
 
 
-def test_the_exact_response_is_that_of_the_same_input() -> None:
+def test_the_exact_response_is_that_of_the_same_input_and_output() -> None:
     system, omega = sw.TransferFunction([1.0], [1.0, 0.3, 2.0]), [0.1, 0.5, 3.0]
     for x, how in (("hold", "zoh"), ("linear", "linear")):
         chart: Any = sw.charts.bode(system, ["rk4"], dt=0.4, x=x, omega=omega)  # type: ignore[arg-type]
@@ -52,6 +47,9 @@ def test_the_exact_response_is_that_of_the_same_input() -> None:
     chart = sw.charts.bode(system, ["rk4"], dt=0.4, omega=omega)
     assert np.array_equal(chart.exact, chart.continuous)
     assert chart.continuous == pytest.approx(np.polyval([1.0], omega) / np.polyval([1.0, 0.3, 2.0], 1j * np.array(omega)))
+    both = sw.LinearSystem([[-1.0, 0.0], [0.0, -2.0]], np.eye(2), np.eye(2), velocities=0)
+    chart = sw.charts.bode(both, ["rk4"], dt=0.1, of=(1, 1), omega=[1.0, 2.0])
+    assert chart.continuous == pytest.approx(1.0 / (2.0 + 1j * np.array([1.0, 2.0])))
 
 
 def test_what_the_summary_says() -> None:
@@ -72,17 +70,14 @@ def test_what_the_summary_says() -> None:
     assert (rk4["phase_margin"], chart.margins.phase) == pytest.approx((16.3, 16.26), abs=0.05)
 
 
-def test_margins_are_those_of_the_loop() -> None:
+def test_margins_are_those_of_the_loop_and_a_phase_runs_on() -> None:
     loop = sw.TransferFunction(4.0, [1.0, 3.0, 3.0, 1.0])
     chart = sw.charts.bode(loop, ["dop853"], dt=0.2, x="hold")
     margins = sw.margins(sw.discretise(loop, 0.2))
     # The search begins at other frequencies, and halves down to the last digit but one.
     assert (chart.margins.gain, chart.margins.phase) == pytest.approx((margins.gain, margins.phase), rel=1e-9)
     assert chart.summary()[0]["gain_margin"] == pytest.approx(margins.gain, rel=1e-6)
-
-
-def test_a_phase_runs_on() -> None:
-    """Without jumps of 360°, and past a pole on the axis, where there is none."""
+    # Without jumps of 360°, and past a pole on the axis, where there is none.
     cube = sw.charts.bode(sw.TransferFunction(1.0, [1.0, 3.0, 3.0, 1.0]), ["rk4"], dt=0.01)
     assert phase(cube.continuous)[-1] == pytest.approx(-270.0, abs=1.0)
     response = np.array([1.0 + 0j, complex(np.inf, np.nan), -1.0 + 0j])
@@ -90,22 +85,13 @@ def test_a_phase_runs_on() -> None:
     assert np.isfinite(phase(response)[[0, 2]]).all()
 
 
-def test_the_output_and_the_input_that_are_charted() -> None:
-    both = sw.LinearSystem([[-1.0, 0.0], [0.0, -2.0]], np.eye(2), np.eye(2), velocities=0)
-    chart = sw.charts.bode(both, ["rk4"], dt=0.1, of=(1, 1), omega=[1.0, 2.0])
-    assert chart.continuous == pytest.approx(1.0 / (2.0 + 1j * np.array([1.0, 2.0])))
-
-
 def test_tables(tmp_path: Path) -> None:
     chart = sw.charts.bode(OSCILLATOR, ["rk4", "false_euler"], dt=0.5, omega=[0.1, 1.0, 2.0])
     rows = chart.rows()
     assert [row["method"] for row in rows] == ["exact"] * 3 + ["rk4"] * 3 + ["false_euler"] * 3
-    chart.to_csv(tmp_path / "bode.csv")
-    with (tmp_path / "bode.csv").open(encoding="utf-8") as file:
-        assert [float(row["gain_db"]) for row in csv.DictReader(file)] == [row["gain_db"] for row in rows]
-    chart.to_json(tmp_path / "bode.json")
-    read = json.loads((tmp_path / "bode.json").read_text(encoding="utf-8"))
-    assert (read["x"], len(read["rows"]), read["summary"][0]["method"]) == ("sine", 9, "rk4")
+    table, whole = files_of(chart, tmp_path)
+    assert [float(row["gain_db"]) for row in table] == [row["gain_db"] for row in rows]
+    assert (whole["x"], len(whole["rows"]), whole["summary"][0]["method"]) == ("sine", 9, "rk4")
 
 
 def test_methods_that_cannot_step_it() -> None:

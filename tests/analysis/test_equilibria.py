@@ -1,7 +1,5 @@
 """Equilibria that are known: of the pendulum, of the restricted three bodies, of linear systems; and what is none."""
 
-from __future__ import annotations
-
 import itertools
 import math
 from typing import Any
@@ -12,6 +10,18 @@ import stepwell as sw
 from support.looped import looped
 
 EPS = np.finfo(float).eps
+
+
+def test_without_velocities_near_is_an_array() -> None:
+    """Lotka and Volterra's centre (1, 1), near a state alone or near a pair with none."""
+
+    @sw.system(order=1)
+    def prey(t: Any, y: Any) -> Any:
+        return [y[0] * (1.0 - y[1]), y[1] * (y[0] - 1.0)]
+
+    (one,), (other,) = (sw.equilibria(prey(), near=near) for near in (np.array([0.9, 1.2]), (None, [0.9, 1.2])))
+    np.testing.assert_array_equal(one.y, other.y)
+    np.testing.assert_allclose(one.y, 1.0, atol=1e-12)
 
 
 def test_the_pendulum_hangs_or_stands() -> None:
@@ -48,11 +58,9 @@ def test_damping_decides(damping: float, kinds: list[str]) -> None:
 
 
 def quintics(mu: float) -> list[float]:
-    """The x of L1, L2 and L3, from Euler's quintics in the distance from the nearer body (Szebehely 1967, §4.4), by bisection.
-
-    γ⁵ ∓ (3 − μ)γ⁴ + (3 − 2μ)γ³ − μγ² ± 2μγ − μ = 0 for L1 and L2, γ the distance from the light body; for L3, at the distance γ
-    from the heavy one, γ⁵ + (2 + μ)γ⁴ + (1 + 2μ)γ³ − (1 − μ)γ² − 2(1 − μ)γ − (1 − μ) = 0.
-    """
+    """The x of L1, L2 and L3, from Euler's quintics in the distance from the nearer body (Szebehely 1967, §4.4), by bisection."""
+    # γ⁵ ∓ (3 − μ)γ⁴ + (3 − 2μ)γ³ − μγ² ± 2μγ − μ = 0 for L1 and L2, γ the distance from the light body; for L3, at the distance γ
+    # from the heavy one, γ⁵ + (2 + μ)γ⁴ + (1 + 2μ)γ³ − (1 − μ)γ² − 2(1 − μ)γ − (1 − μ) = 0.
     polynomials = [
         [1, -(3 - mu), 3 - 2 * mu, -mu, 2 * mu, -mu],
         [1, 3 - mu, 3 - 2 * mu, -mu, -2 * mu, -mu],
@@ -88,6 +96,9 @@ def test_the_five_points_of_lagrange(mu: float) -> None:
     # Gascheau and Routh: L4 and L5 are centres if 27μ(1 − μ) < 1.
     of_triangle = "centre" if 27 * mu * (1 - mu) < 1 else "saddle"
     assert [each.kind for each in equilibria] == ["saddle"] * 3 + [of_triangle] * 2
+    around = np.outer([1.0, 1.01, 0.995], [x, y]).reshape(3, 2, 5).swapaxes(0, 1)
+    many = sw.equilibria(sw.RestrictedThreeBody(mu), near=(np.zeros((2, 3, 5)), around))
+    assert len(many) == 5  # velocities of 1e-29 do not tell them apart
     # Their eigenvalues: λ⁴ + λ² + 27μ(1 − μ)/4 = 0.
     for each in equilibria[3], equilibria[4]:
         left = each.eigenvalues**4 + each.eigenvalues**2 + 27 * mu * (1 - mu) / 4
@@ -116,32 +127,25 @@ def test_a_linear_system_is_solved_at_once() -> None:
     assert equilibrium.analysis.stable
 
 
-def test_bodies_that_part_have_no_equilibrium() -> None:
+def test_none_and_a_line_of_equilibria() -> None:
     """Their forces fade, so a residual alone would call far enough an equilibrium."""
     for force in ("logarithmic", "newton"):
         equilibria = sw.equilibria(sw.NBody([1.0, 2.0], force=force), near=(np.zeros((2, 2)), np.array([[1.0, 0.0], [0.0, 1.0]])))
         assert len(equilibria) == 0
         assert equilibria.lost == (0,)
-
-
-def test_a_line_of_equilibria_is_not_isolated() -> None:
-    """A mass that nothing holds stays anywhere."""
+    # A mass that nothing holds stays anywhere.
     (equilibrium,) = sw.equilibria(sw.LinearSystem([[0.0, 0.0], [1.0, 0.0]]), near=(np.array([1.0]), np.array([5.0])))
-    assert equilibrium.y == 5.0
-    assert equilibrium.v == 0.0
+    assert (equilibrium.y, equilibrium.v) == (5.0, 0.0)
     assert not equilibrium.isolated
     assert equilibrium.kind == "undecided to first order"
     assert equilibrium.stable is None
 
 
-def test_units_do_not_matter() -> None:
+def test_units_do_not_matter_and_many_starts_are_found_once() -> None:
     """A pendulum in years: rates of 10⁸ beside velocities, and the same two places."""
     equilibria = sw.equilibria(sw.Pendulum(3e8), near=(1e8, [0.3, 3.0]))
     assert [each.kind for each in equilibria] == ["centre", "saddle"]
     assert equilibria[0].v == equilibria[1].v == 0.0
-
-
-def test_many_starts_are_found_once() -> None:
     starts = np.linspace(-4.0, 4.0, 60).reshape(3, 20)
     equilibria = sw.equilibria(sw.Pendulum(), near=(np.zeros(20), starts))
     places = np.array([each.y for each in equilibria])
@@ -167,9 +171,6 @@ def test_wrong_calls_say_what_is_wrong(wrong: dict[str, Any], says: str) -> None
         sw.equilibria(**{"system": sw.Pendulum(), "near": (0.0, 0.3)} | wrong)
 
 
-# ---- an eigenvalue that is zero
-
-
 @sw.system(order=1)
 def expanded(t, y):
     """(y − 1)² as rounding sees it."""
@@ -191,10 +192,8 @@ def floating(t, v, y, *, k=1.0):
 @looped("at", [0.0, 1.0, -3e5])
 @looped("p", [2, 3])
 def test_a_multiple_root_is_undecided_from_every_side(p: int, at: float) -> None:
-    """Each step of Newton's method leaves 1 − 1/p of the distance, and an eigenvalue of p·distance^(p − 1), of either sign.
-
-    Alone it has nothing to be small beside.
-    """
+    """Each step of Newton's method leaves 1 − 1/p of the distance, and an eigenvalue of p·distance^(p − 1), of either sign."""
+    # Alone it has nothing to be small beside.
     size = abs(at) or 1.0
     for start in (at + 0.5 * size, at - 0.5 * size, at + 1e-3 * size):
         equilibria = sw.equilibria(definition(p, at)(), near=(None, np.array(start)))
@@ -289,3 +288,53 @@ def test_an_extreme_of_a_rate_is_no_equilibrium(least: float) -> None:
     """There Newton's step is zero, but the rate is not."""
     equilibria = sw.equilibria(sw.system(order=1)(lambda t, y: (y - 1.0) ** 2 + least)(), near=(None, np.array([1.0])))
     assert (len(equilibria), equilibria.lost) == (0, (0,))
+
+
+@sw.system(order=1)
+def isomers(t, y, *, k=1.0, back=3.0):
+    """A turns into B, catalysed by it, and back: A + B is constant, and with sum S rests at B = S − back/k or B = 0."""
+    turned = k * y[0] * y[1] - back * y[1]
+    return [-turned, turned]
+
+
+@sw.system
+def gliding(t, v, y, *, c=2.0):
+    """Drag alone: v + c·y is constant."""
+    return -c * v
+
+
+#: The 22 species of Huang and Ferrell's cascade (1996), bound ones as enzyme and substrate; and those of its start.
+REACTIONS = [
+    each.split() for each in ("a e1 x", "x e2 a", "b x c", "c x d", "c p b", "d p c", "k d l", "l d m", "l q k", "m q l")
+]
+AMOUNTS = {"a": 0.003, "e1": 3e-5, "e2": 3e-4, "b": 1.2, "p": 3e-4, "k": 1.2, "q": 0.12}
+SPECIES = [*"abcdxklmpq", "e1", "e2", *(each[0] + each[1] for each in REACTIONS)]
+
+
+@sw.system(order=1)
+def cascade(t, y):
+    amounts, rates = dict(zip(SPECIES, y, strict=True)), dict.fromkeys(SPECIES, 0.0)
+    for substrate, enzyme, product in REACTIONS:
+        bound = substrate + enzyme
+        binds, turns = 1000.0 * amounts[substrate] * amounts[enzyme] - 150.0 * amounts[bound], 150.0 * amounts[bound]
+        for name, rate in ((substrate, -binds), (enzyme, turns - binds), (bound, binds - turns), (product, turns)):
+            rates[name] = rates[name] + rate
+    return list(rates.values())
+
+
+def test_constant_sums_are_kept_and_left_out_of_the_label() -> None:
+    """From each start with its own sum, where Newton's shortest step changes it; seven sums of a cascade of kinases."""
+    rests = sw.equilibria(isomers(), near=(None, np.array([[4.0, 4.1, 0.5], [1.0, 3.9, 0.1]])))
+    np.testing.assert_allclose([each.y for each in rests], [[3.0, 2.0], [3.0, 5.0], [0.6, 0.0]], atol=1e-12)
+    assert [(each.kind, each.isolated) for each in rests] == [("sink", True)] * 3
+    np.testing.assert_allclose(rests.sums, [[1.0, 1.0]], atol=1e-15)
+    np.testing.assert_allclose(rests[1].eigenvalues, [0.0, -5.0], atol=1e-12)
+    (glided,) = sw.equilibria(gliding(), near=(3.0, 1.0))
+    assert (glided.kind, glided.v, glided.y) == ("sink", 0.0, pytest.approx(2.5, rel=1e-15))
+    start = np.array([AMOUNTS.get(name, 0.0) for name in SPECIES])
+    (rest,) = found = sw.equilibria(cascade(), near=(None, start))
+    assert (rest.kind, rest.isolated, found.sums.shape) == ("sink", True, (7, 22))
+    run = sw.integrate(cascade(), "rodas5p", y=start, at=[2000.0], tolerance=1e-9)
+    np.testing.assert_allclose(rest.y, run.y[-1], atol=1e-9)
+    np.testing.assert_allclose(found.sums @ rest.y, found.sums @ start, atol=1e-14)
+    assert set(found.sums.ravel()) == {-1.0, 0.0, 1.0}

@@ -1,7 +1,5 @@
 """Lyapunov exponents that are known: of linear systems, by symmetry, by volume; and that states are those of ``integrate``."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np
@@ -13,6 +11,8 @@ from stepwell.model.systems import System
 from support.looped import looped
 
 EPS = np.finfo(float).eps
+#: Three bodies near each other.
+THREE = np.array([[0.9, 0.1], [-0.5, 0.8], [-0.4, -0.9]])
 
 
 @looped("method", ["standard_euler", "false_euler", "rk4", "merson", "false_heun"])
@@ -32,12 +32,15 @@ def test_of_a_linear_system_they_are_the_logarithms_of_the_eigenvalues(method: s
     assert spectrum.t[-1] == (transient + steps) * dt
 
 
-def test_one_exponent_is_the_largest_of_all() -> None:
+def test_one_exponent_is_the_largest_of_all_and_long_steps_are_refused() -> None:
     system = sw.LinearSystem([[-1.0, 0.3], [0.2, 0.5]])
     arguments = {"v": 0.0, "y": 0.0, "dt": 0.1, "steps": 200, "transient": 400}
     every = sw.lyapunov(system, "rk4", exponents="all", **arguments).exponents
     np.testing.assert_allclose(sw.lyapunov(system, "rk4", **arguments).exponents, every[:1], rtol=0, atol=40 * EPS / 0.1)
     np.testing.assert_allclose(sw.lyapunov(system, "rk4", exponents=2, **arguments).exponents, every, rtol=0, atol=40 * EPS / 0.1)
+    y = np.random.default_rng(1).random((500, 2))
+    with pytest.raises(UnsupportedError, match=r"at most 100,000 operations.* about 11,000,000 for NBody"):
+        sw.lyapunov(sw.NBody(np.ones(500)), "rk4", v=0.0, y=y, dt=0.1, steps=1)
 
 
 @looped("method", ["false_euler", "leapfrog", "pefrl", "verlet", "rk4"])
@@ -56,7 +59,7 @@ def test_vectors_on_one_tape_and_each_beside_a_copy_of_the_state_are_the_same(
     method: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """To the bit: short steps go one way, long ones the other."""
-    y = np.array([[0.9, 0.1], [-0.5, 0.8], [-0.4, -0.9]])[:, :, np.newaxis] * np.linspace(1.0, 1.1, 5)
+    y = THREE[:, :, np.newaxis] * np.linspace(1.0, 1.1, 5)
     arguments: dict[str, Any] = {"v": 0.0, "y": y, "dt": 0.05, "steps": 43, "transient": 12, "exponents": 4}
     bodies = sw.NBody([1.0, 1.0, 1.0], softening=0.3)
     together = sw.lyapunov(bodies, method, **arguments)
@@ -104,13 +107,7 @@ def test_disturbances_obey_the_variational_equations() -> None:
     np.testing.assert_allclose(spectrum.exponents[0], growth / (steps * dt), rtol=0, atol=bound)
 
 
-def test_a_step_that_is_too_long_is_refused_before_it_is_differentiated() -> None:
-    y = np.random.default_rng(1).random((500, 2))
-    with pytest.raises(UnsupportedError, match=r"at most 100,000 operations.* about 11,000,000 for NBody"):
-        sw.lyapunov(sw.NBody(np.ones(500)), "rk4", v=0.0, y=y, dt=0.1, steps=1)
-
-
-def test_damping_is_the_sum() -> None:
+def test_the_pendulums_damping_is_the_sum_and_without_it_there_is_none() -> None:
     """Volumes shrink by −2Dω₀ per unit of time. RK4 misses ln det by O(dt⁴): halving the step divides what is left by 16."""
     misses = []
     for dt in (0.025, 0.0125):
@@ -119,30 +116,26 @@ def test_damping_is_the_sum() -> None:
     assert abs(misses[1]) < 1e-8
     # a·h⁴·(1 + b·h) with b of the size of some rates of the motion: b·h/2 is 0.075 for b = 4ω₀.
     assert 16 * 0.925 < misses[0] / misses[1] < 16 * 1.075
-
-
-def test_a_symplectic_method_keeps_pairs_and_volume() -> None:
-    """Exponents of ± the same size, and a sum of zero to rounding, at any step."""
-    y = np.array([[0.9, 0.1], [-0.5, 0.8], [-0.4, -0.9]])
-    system = sw.NBody([1.0, 1.0, 1.0], softening=0.5)
-    for method in ("false_euler", "pefrl"):
-        spectrum = sw.lyapunov(system, method, v=np.zeros((3, 2)), y=y, dt=0.05, steps=400, exponents="all", every=5)
-        # A step has determinant 1, of which some 200 roundings leave eps each, and an orthonormalisation as many.
-        assert abs(spectrum.sum) <= 400 * EPS / 0.05
-        np.testing.assert_allclose(spectrum.history.sum(axis=1), 0.0, rtol=0, atol=400 * EPS / 0.05)
-        # Pairs come out in time: a vector started as a unit one is not along its direction at once, which leaves ln(n·κ)/T.
-        np.testing.assert_allclose(spectrum.exponents + spectrum.exponents[::-1], 0.0, atol=np.log(12 * 20) / 20.0)
-        assert spectrum.exponents[0] > 0.05  # three bodies close together part
-
-
-def test_a_pendulum_that_swings_has_none() -> None:
-    """Its disturbances grow linearly, as the period depends on the swing: (ln T)/T and no more, and not for ever."""
+    # Its disturbances grow linearly, as the period depends on the swing: (ln T)/T and no more, and not for ever.
     spectrum = sw.lyapunov(sw.Pendulum(), "pefrl", v=0.0, y=2.0, dt=0.1, steps=4000, exponents="all", every=20)
     T = 400.0
     # Growth is at most 1 + c·T with c = |dω/dA|·A below 1 at this swing, in the norm of (v, y).
     assert abs(spectrum.exponents[0]) <= np.log(2 * T) / T
     half = spectrum.history[len(spectrum.history) // 2 - 1].max()
     assert spectrum.exponents[0] < half
+
+
+def test_a_symplectic_method_keeps_pairs_and_volume() -> None:
+    """Exponents of ± the same size, and a sum of zero to rounding, at any step."""
+    system = sw.NBody([1.0, 1.0, 1.0], softening=0.5)
+    for method in ("false_euler", "pefrl"):
+        spectrum = sw.lyapunov(system, method, v=np.zeros((3, 2)), y=THREE, dt=0.05, steps=400, exponents="all", every=5)
+        # A step has determinant 1, of which some 200 roundings leave eps each, and an orthonormalisation as many.
+        assert abs(spectrum.sum) <= 400 * EPS / 0.05
+        np.testing.assert_allclose(spectrum.history.sum(axis=1), 0.0, rtol=0, atol=400 * EPS / 0.05)
+        # Pairs come out in time: a vector started as a unit one is not along its direction at once, which leaves ln(n·κ)/T.
+        np.testing.assert_allclose(spectrum.exponents + spectrum.exponents[::-1], 0.0, atol=np.log(12 * 20) / 20.0)
+        assert spectrum.exponents[0] > 0.05  # three bodies close together part
 
 
 def test_the_carry_has_the_same_exponents_as_the_state() -> None:
@@ -158,8 +151,7 @@ def test_the_carry_has_the_same_exponents_as_the_state() -> None:
 
 def test_under_a_control_volumes_change_as_the_steps_say() -> None:
     """The sum is the logarithm of the determinant of the product of all steps, as ``analyse`` finds it in another way."""
-    y = np.array([[0.9, 0.1], [-0.5, 0.8], [-0.4, -0.9]])
-    start = {"v": 0.1 * y[::-1], "y": y, "dt": 0.05, "steps": 40}
+    start = {"v": 0.1 * THREE[::-1], "y": THREE, "dt": 0.05, "steps": 40}
     run = sw.integrate(sw.NBody([1.0, 1.0, 1.0], softening=0.3), "rk4", **start, every=1, control=sw.EnergyControl(0.1))
     spectrum = sw.lyapunov(run.system, "rk4", **start, exponents="all")
     np.testing.assert_array_equal(spectrum.y, run.y[-1])
@@ -238,11 +230,10 @@ def test_with_a_tolerance_the_unit_of_the_state_does_not_matter(size: float) -> 
 @looped("k", [2, "all"])
 def test_with_a_tolerance_bodies_have_those_of_short_steps(k: Any) -> None:
     """Twelve disturbances make an attempt too long for one tape, two do not. Steps of 0.002 by rk4 are right to h⁴ ~ 10⁻¹¹."""
-    y = np.array([[0.9, 0.1], [-0.5, 0.8], [-0.4, -0.9]])
     bodies = sw.NBody([1.0, 1.0, 1.0], softening=0.5)
     at = np.arange(1.0, 11.0)
-    spectrum = sw.lyapunov(bodies, "dop853", v=0.0, y=y, tolerance=1e-11, at=at, exponents=k)
-    fixed = sw.lyapunov(bodies, "rk4", v=0.0, y=y, dt=0.002, steps=5000, every=500, exponents=k)
+    spectrum = sw.lyapunov(bodies, "dop853", v=0.0, y=THREE, tolerance=1e-11, at=at, exponents=k)
+    fixed = sw.lyapunov(bodies, "rk4", v=0.0, y=THREE, dt=0.002, steps=5000, every=500, exponents=k)
     # Some ten steps in a unit of time, whose errors grow with the motion, by e^(0.5·10).
     np.testing.assert_allclose(spectrum.history, fixed.history, rtol=0, atol=10 * 1e-11 * np.exp(5.0) + 100 * 0.002**4)
 
@@ -346,7 +337,7 @@ def near_the_attractor(members: int) -> Any:
     return np.array([np.linspace(1, 2, members), np.linspace(1, 3, members), np.full(members, 20.0)])
 
 
-def test_the_exponents_of_lorenz() -> None:
+def test_lorenz() -> None:
     """0.9056, 0 and −14.572 (Sprott 2003), whose sum is −σ − 1 − β at every point of the motion."""
     arguments: dict[str, Any] = {"y": near_the_attractor(64), "exponents": "all"}
     spectrum = sw.lyapunov(Lorenz(), "rk4", **arguments, dt=0.01, steps=3000, transient=2500)
@@ -357,18 +348,7 @@ def test_the_exponents_of_lorenz() -> None:
     finer = sw.lyapunov(Lorenz(), "rk4", **arguments, dt=0.005, steps=1000, transient=200)
     S, half = spectrum.sum.mean(), finer.sum.mean()
     assert abs((16 * half - S) / 15 + 10.0 + 1.0 + 8.0 / 3.0) < abs(S - half) / 3 < 1e-4
-
-
-def assert_lorenz(spectrum: Lyapunov) -> None:
-    members = spectrum.exponents.shape[1]
-    mean, error = spectrum.exponents.mean(axis=1), spectrum.exponents.std(axis=1) / np.sqrt(members)
-    # Members lose sight of each other within the transient, so the error of the mean is that of so many samples.
-    assert (np.abs(mean - [0.9056, 0.0, -14.572]) < 5 * error + 1e-3).all()
-    assert (error < 0.01).all()
-
-
-def test_equilibria_and_limits_of_lorenz() -> None:
-    """The origin and (±√(β(ρ − 1)), ±√(β(ρ − 1)), ρ − 1)."""
+    # The origin and (±√(β(ρ − 1)), ±√(β(ρ − 1)), ρ − 1).
     near = np.array([[0.1, 8.0, -8.0], [0.1, 8.0, -8.0], [0.1, 27.0, 27.0]])
     equilibria = sw.equilibria(Lorenz(), near=(None, near), method="rk4", dt=0.01)
     c = np.sqrt(8 / 3 * 27)
@@ -380,8 +360,6 @@ def test_equilibria_and_limits_of_lorenz() -> None:
     limit = sw.stability_limit(Lorenz(), "rk4", y=np.zeros(3))
     assert limit == 0.0  # the origin's own motion grows
 
-
-def test_the_exponents_of_lorenz_as_a_users_own_equations() -> None:
     @sw.system(order=1)  # type: ignore[attr-defined]
     def lorenz(t: Any, y: Any, *, sigma: Any = 10.0, rho: Any = 28.0, beta: Any = 8.0 / 3.0) -> Any:
         return [sigma * (y[1] - y[0]), y[0] * (rho - y[2]) - y[1], y[0] * y[1] - beta * y[2]]
@@ -390,3 +368,11 @@ def test_the_exponents_of_lorenz_as_a_users_own_equations() -> None:
     assert_lorenz(sw.lyapunov(lorenz(), "rk4", y=y, dt=0.01, steps=3000, transient=2500, exponents="all"))
     at = y[:, 0]
     np.testing.assert_array_equal(sw.jacobian(lorenz(), y=at).matrix, sw.jacobian(Lorenz(), y=at).matrix)
+
+
+def assert_lorenz(spectrum: Lyapunov) -> None:
+    members = spectrum.exponents.shape[1]
+    mean, error = spectrum.exponents.mean(axis=1), spectrum.exponents.std(axis=1) / np.sqrt(members)
+    # Members lose sight of each other within the transient, so the error of the mean is that of so many samples.
+    assert (np.abs(mean - [0.9056, 0.0, -14.572]) < 5 * error + 1e-3).all()
+    assert (error < 0.01).all()

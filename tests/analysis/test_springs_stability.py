@@ -1,7 +1,5 @@
 """The safe step of nets of springs, and the exact limit of small ones."""
 
-from __future__ import annotations
-
 import itertools
 import math
 from typing import Any
@@ -35,7 +33,8 @@ def test_the_safe_step_is_never_above_the_exact_limit(method: str, i: int) -> No
         assert sw.stability_limit(net, method, v=0.0, y=y) == math.inf
     elif safe > 0.0:
         exact = float(sw.stability_limit(net, method, v=0.0, y=y))
-        assert 0.2 * exact < safe <= exact * (1 + 1e-6)
+        # Tsitouras' step is stable for long where there is friction, and of the undamped oscillator for Φ < 0.48 alone.
+        assert (0.1 if method == "tsit5" else 0.2) * exact < safe <= exact * (1 + 1e-6)
     else:
         assert sw.method(method).limit == 0.0
 
@@ -59,6 +58,7 @@ def test_the_exact_limit_of_nets_that_drift_or_are_fixed_is_known() -> None:
         sw.stability_limit(fixed, "leapfrog")
 
 
+@pytest.mark.filterwarnings("ignore:the run gained energy")
 def test_a_lattice_needs_the_safe_step() -> None:
     """Springs of no rest length resist all displacements alike, so the lattice is two of graphs: in its fastest mode all
     neighbours swing against each other, with ω² = (8k/m)·sin²(½π(n − 1)/n); the bound is 8k/m. It holds below that, and grows
@@ -78,7 +78,8 @@ def test_a_lattice_needs_the_safe_step() -> None:
         assert (float(run.recorded["energy"][-1]) < 1000.0 * start) == stays
 
 
-def test_the_safe_step_with_damping_from_both_sides() -> None:
+@pytest.mark.filterwarnings("ignore:the run gained energy")
+def test_the_safe_step_with_damping_of_batches_and_of_nothing() -> None:
     """One spring is exact: h²κ + 2hc = 4 by False Euler, κ = k/m, c = d/m."""
     for damping in (0.1, 1.0, 10.0):
         one = sw.Springs([(0, 1)], stiffness=2.0, rest=1.0, masses=0.5, fixed=[0], damping=damping, dim=1)
@@ -88,9 +89,6 @@ def test_the_safe_step_with_damping_from_both_sides() -> None:
         for factor, stays in ((0.99, True), (1.01, False)):
             run = sw.integrate(one, "false_euler", v=0.0, y=[[0.0], [1.0 + 1e-9]], dt=factor * limit, steps=3000)
             assert (abs(float(run.y[-1, 1, 0]) - 1.0) < 1e-9) == stays
-
-
-def test_the_safe_step_of_batches_and_of_nothing() -> None:
     batch = sw.Springs([(0, 1)], stiffness=np.array([[1.0, 4.0, 0.0]]), rest=1.0, masses=0.5)
     np.testing.assert_allclose(batch.safe_step("verlet"), [1.0, 0.5, np.inf], rtol=1e-14)
     damped = sw.Springs([(0, 1)], stiffness=np.array([[1.0, 4.0]]), damping=np.array([[0.5, 0.0]]), rest=1.0, masses=0.5)

@@ -1,7 +1,5 @@
 """Transition matrices, their eigenvalues and what is said of them, against closed forms."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 
@@ -18,9 +16,6 @@ def closed(method: str, phi: Any) -> tuple[Any, Any]:
     """p and q of the closed form: half the trace of a step, and its determinant."""
     steps = np.array([CLOSED_FORMS[method](x) for x in phi])
     return np.trace(steps, axis1=1, axis2=2) / 2, steps[:, 0, 0] * steps[:, 1, 1] - steps[:, 0, 1] * steps[:, 1, 0]
-
-
-# ---- analyse
 
 
 @looped("method", CLOSED_FORMS)
@@ -157,7 +152,7 @@ def test_at_exactly_two_the_samples_grow_linearly(method: str) -> None:
     assert math.log(abs(outside.y[-1] / outside.y[1])) == pytest.approx(predicted, abs=1000 * 50 * EPS)
 
 
-def test_semi_false_heun_is_not_always_stable() -> None:
+def test_what_the_document_says_wrongly_of_the_false_heuns() -> None:
     """§11 says so. The samples are a damped oscillation below 1.5723 and grow, changing signs, above."""
     limit = sw.method("semi_false_heun").limit
     for phi, kind in ((limit - 1e-3, "damped oscillation"), (limit + 1e-3, "unstable oscillation")):
@@ -166,9 +161,6 @@ def test_semi_false_heun_is_not_always_stable() -> None:
         run = sw.integrate(sw.Oscillator(), "semi_false_heun", v=0.0, y=1.0, dt=phi, steps=20_000, every=10_000)
         assert math.log(abs(run.y[-1] / run.y[1])) == pytest.approx(10_000 * math.log(a.radius), abs=10_000 * 50 * EPS)
         assert a.q == pytest.approx(1 - phi**4 / 4, abs=20 * EPS)  # below 1 on both sides: r₁² = q holds for pairs only
-
-
-def test_the_misprinted_matrix_of_false_heun_has_another_determinant() -> None:
     phi = 0.9
     a = sw.analyse(sw.Oscillator(), "false_heun", dt=phi)
     off = phi * (1 - phi**2 / 2)
@@ -179,10 +171,8 @@ def test_the_misprinted_matrix_of_false_heun_has_another_determinant() -> None:
 
 @looped("method", ["standard_euler", "standard_heun", "rk4", "merson", "fehlberg", "fehlberg_5"])
 def test_growth_over_thousands_of_steps(method: str) -> None:
-    """The energy of the canonical oscillator is multiplied by r₁² each step, because P is r₁ times a rotation.
-
-    Fehlberg's results pump energy in, Merson's and RK4's take it out.
-    """
+    """The energy of the canonical oscillator is multiplied by r₁² each step, because P is r₁ times a rotation."""
+    # Fehlberg's results pump energy in, Merson's and RK4's take it out.
     phi = np.array([0.01, 0.1, 0.3, 1.0])
     a = sw.analyse(sw.Oscillator(phi), method, dt=1.0)
     _, q = closed(method, phi)

@@ -1,7 +1,5 @@
 """Stability limits along a run: against closed forms, against ``stability_limit``, and against runs."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import stepwell as sw
@@ -71,15 +69,12 @@ def test_scaled_limits_are_those_that_are_tried(method: str) -> None:
     np.testing.assert_allclose(scaled.limits, tried.limits, rtol=1e-7)
 
 
-def test_a_linear_system_has_one_limit() -> None:
+def test_a_linear_system_has_one_limit_and_a_batch_one_for_each_member() -> None:
     system = sw.LinearSystem([[-2.0, 1.0, 0.0], [0.0, -3.0, 1.0], [1.0, 0.0, -1.0]], velocities=1)
     run = sw.integrate(system, "rk4", v=np.ones(1), y=np.ones(2), dt=0.1, steps=3, every=1)
     for method in ("rk4", "merson", "false_euler"):
         along = sw.stability_along(run, method)
         np.testing.assert_allclose(along.limits, float(sw.stability_limit(system, method)), rtol=1e-9)
-
-
-def test_a_batch_has_a_limit_for_each_member() -> None:
     omega = np.array([1.0, 3.0])
     run = sw.integrate(sw.Pendulum(omega), "rk4", v=0.0, y=np.array([[0.5], [1.0], [1.4]]), dt=0.01, steps=300, every=10)
     along = sw.stability_along(run, "false_euler")
@@ -93,7 +88,7 @@ def test_a_batch_has_a_limit_for_each_member() -> None:
             assert along.mode[i, j].rate == pytest.approx(one.mode.rate, rel=1e-12)
 
 
-def test_the_limit_of_an_orbit_is_at_its_pericentre() -> None:
+def test_the_limit_of_an_orbit_is_at_its_pericentre_and_past_a_limit_runs_grow() -> None:
     scene = sw.scenes.kepler()
     run = scene.run("leapfrog", 0.001, steps=7000, every=7)
     along = sw.stability_along(run)
@@ -104,10 +99,7 @@ def test_the_limit_of_an_orbit_is_at_its_pericentre() -> None:
     M = float(np.sum(scene.system.masses * scene.system.G))
     np.testing.assert_allclose(along.limits, 2.0 / np.sqrt(M / r**3), rtol=1e-9)
     np.testing.assert_allclose(along.growth, np.sqrt(2.0 * M / r**3), rtol=1e-9)
-
-
-def test_past_the_limit_a_run_that_should_swing_grows() -> None:
-    """A stiff pendulum that hangs almost still: below the limit it stays, above it does not."""
+    # A stiff pendulum that hangs almost still: below the limit it stays, above it does not.
     start = {"v": 0.0, "y": 1e-6}
     run = sw.integrate(sw.Pendulum(1.0, 0.3), "false_euler", **start, dt=0.01, steps=10, every=1)
     limit = float(sw.stability_along(run).dt)
@@ -116,7 +108,7 @@ def test_past_the_limit_a_run_that_should_swing_grows() -> None:
     assert abs(above.y[-1]) > 1e-3
 
 
-def test_a_state_that_is_not_finite_has_no_limit() -> None:
+def test_what_has_no_limit() -> None:
     with pytest.warns(sw.DivergenceWarning):
         run = sw.integrate(sw.LinearSystem([[1e200]], velocities=0), "rk4", v=np.zeros(0), y=np.ones(1), dt=1.0, steps=3, every=1)
     assert sw.stability_along(run).limits.shape == (4,)
@@ -124,9 +116,6 @@ def test_a_state_that_is_not_finite_has_no_limit() -> None:
         run = sw.integrate(sw.NBody([1.0, 1.0]), "rk4", v=0.0, y=np.zeros((2, 2)), dt=0.1, steps=2, every=1)
     along = sw.stability_along(run)
     assert np.isnan(along.limits[1:]).all()
-
-
-def test_wrong_calls_say_what_is_wrong() -> None:
     with pytest.raises(sw.errors.DTypeError, match="run: expected what integrate returns"):
         sw.stability_along(sw.Pendulum())  # type: ignore[arg-type]
     run = sw.integrate(sw.Pendulum(1.0, 0.1), "rk4", v=0.0, y=1.0, dt=0.1, steps=2)

@@ -1,7 +1,5 @@
 """Eigenvalues where rounding counts, along runs and of several modes, and what is wrong with arguments."""
 
-from __future__ import annotations
-
 import itertools
 import math
 from typing import Any
@@ -12,10 +10,11 @@ import stepwell as sw
 from stepwell.analysis.stability import eigen, limit_search
 from stepwell.errors import ArgumentError, DTypeError, ShapeError, TooLargeError, UnsupportedError
 from support.looped import in_turn, looped
+from support.refusals import refused
 from support.stability_cases import EPS
 
 
-def test_small_growth_is_seen_beside_what_is_on_the_circle() -> None:
+def test_growth_and_angles_are_as_exact_as_the_matrix() -> None:
     """A slow oscillator with negative damping beside a fast one on the circle: growth of 1e-10 a step decides."""
     a = np.zeros((4, 4))
     a[2, 0] = a[3, 1] = 1.0
@@ -25,10 +24,7 @@ def test_small_growth_is_seen_beside_what_is_on_the_circle() -> None:
     assert (analysis.kind, bool(analysis.stable)) == ("unstable oscillation", False)
     # e^(½·2e-9·dt) a step, of which |z| has some eps times 1/|wᴴx| = 1/0.01.
     assert analysis.radius - 1 == pytest.approx(1e-10, abs=100 * 10 * EPS)
-
-
-def test_the_angle_of_verlet_is_as_exact_as_its_matrix() -> None:
-    """P has 2 − Φ², rounded to 2⁻⁵²: of Φ² a share of 2⁻⁵³·2/Φ² or less, and half of that of Ψ = 2·asin(Φ/2)."""
+    # P has 2 − Φ², rounded to 2⁻⁵²: of Φ² a share of 2⁻⁵³·2/Φ² or less, and half of that of Ψ = 2·asin(Φ/2).
     phi = np.array([1e-4, 1e-3, 1e-2, 0.1, 1.0])
     a = sw.analyse(sw.Oscillator(), "verlet", dt=phi)
     off = np.abs(a.angle / (2 * np.arcsin(phi / 2)) - 1)
@@ -96,18 +92,14 @@ def test_a_chain_that_floats_has_a_double_eigenvalue_one() -> None:
     assert at_two.kind == "unstable oscillation (double eigenvalue -1)"
 
 
-def test_coefficients_of_more_than_two_states() -> None:
+def test_coefficients_of_more_than_two_states_and_overflow() -> None:
     a = sw.analyse(sw.Chain(3), "rk4", dt=[0.3, 0.4])
     for i in range(2):
         np.testing.assert_allclose(a.polynomial[:, i], np.poly(a.P[:, :, i]), rtol=0, atol=1e-12)
     assert a.p is None
     assert a.q is None
-
-
-def test_overflow_is_said() -> None:
     a = sw.analyse(sw.Oscillator([1.0, 1e200]), "rk4", dt=1.0)
-    assert a.kind.tolist() == ["damped oscillation", "not finite"]
-    assert a.stable.tolist() == [True, False]
+    assert (a.kind.tolist(), a.stable.tolist()) == (["damped oscillation", "not finite"], [True, False])
 
 
 @looped(
@@ -136,13 +128,14 @@ def test_overflow_is_said() -> None:
     ],
 )
 def test_analyse_says_what_is_wrong(arguments: dict[str, Any], error: type[Exception], message: str) -> None:
-    with pytest.raises(error, match=message):
-        sw.analyse(**({"system": sw.Oscillator(), "method": "false_euler"} | arguments))
+    refused(error, message, sw.analyse, **({"system": sw.Oscillator(), "method": "false_euler"} | arguments))
 
 
-def test_a_run_that_is_none_has_no_monodromy() -> None:
+def test_what_is_no_run_of_the_system() -> None:
     with pytest.raises(ArgumentError, match="monodromy"):
         _ = sw.analyse(sw.Oscillator(), "rk4", dt=0.1).monodromy
+    run = sw.integrate(sw.Chain(3), "rk4", v=0.0, y=1.0, dt=0.1, steps=3)
+    refused(ShapeError, "at: expected a run of", sw.analyse, sw.NBody(), "rk4", at=run)
 
 
 def test_along_runs_that_say_less() -> None:
@@ -162,8 +155,7 @@ def test_along_runs_that_say_less() -> None:
     with pytest.raises(ArgumentError, match=r"dt: expected the step.* since the run has chosen its own"):
         sw.analyse(sw.Pendulum(), "fehlberg_5", at=paced)
     assert sw.analyse(sw.Pendulum(), "fehlberg_5", at=paced, dt=0.1).radius.shape == (2,)
-    with pytest.raises(ShapeError, match=r"system \(3,\), at \(2,\)"):
-        sw.analyse(sw.Pendulum([1.0, 2.0, 3.0]), "rk4", at=run)
+    refused(ShapeError, r"system \(3,\), at \(2,\)", sw.analyse, sw.Pendulum([1.0, 2.0, 3.0]), "rk4", at=run)
 
 
 def test_inputs_of_a_linear_system_at_states() -> None:
@@ -177,15 +169,7 @@ def test_inputs_of_a_linear_system_at_states() -> None:
         np.testing.assert_array_equal(a.Q.reshape(2, 2, -1), np.repeat(one.Q[:, :, np.newaxis], math.prod(shape), axis=2))
 
 
-def test_a_run_of_another_system_is_refused() -> None:
-    run = sw.integrate(sw.Chain(3), "rk4", v=0.0, y=1.0, dt=0.1, steps=3)
-    with pytest.raises(ShapeError, match="at: expected a run of"):
-        sw.analyse(sw.NBody(), "rk4", at=run)
-
-
 # ---- equations of one's own that are linear, or at rest
-
-
 @sw.system(order=1)
 def lags(t, y, *, time=1.0, fast=20.0, bend=0.0):
     """Equal lags in a chain, driven, and a fast one behind them."""
@@ -267,12 +251,10 @@ def coupled(t: Any, v: Any, y: Any, *, k: Any = 0.1) -> Any:
 
 @pytest.mark.parametrize(("of_each", "method"), in_turn([False, True], ["rk4", "verlet", "fehlberg"]))
 def test_only_members_whose_limit_is_sought_are_searched(method: str, of_each: bool, monkeypatch: pytest.MonkeyPatch) -> None:
-    """With the bits and modes that all of them had together.
-
-    A member that grows by itself takes the eigenvalues of its rates, and of two steps for its mode. One that is sought takes
-    those of 562 rungs and 60 bisections at most, and of 16 steps around the crossing; members go when half of those left are
-    found, so up to as many again are computed with it.
-    """
+    """With the bits and modes that all of them had together."""
+    # A member that grows by itself takes the eigenvalues of its rates, and of two steps for its mode. One that is sought takes
+    # those of 562 rungs and 60 bisections at most, and of 16 steps around the crossing; members go when half of those left are
+    # found, so up to as many again are computed with it.
     random = np.random.default_rng(4)
     y = np.where(np.arange(60) < 6, 0.3, 3.0) * random.uniform(0.5, 1.0, (4, 60))  # the sixth part hang, the others stand
     system = coupled(k=np.linspace(0.05, 0.15, 60)) if of_each else coupled()

@@ -1,23 +1,19 @@
 """The limit of stability, against closed forms, chains and independent searches."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 
 import numpy as np
 import pytest
 import stepwell as sw
-from stepwell.errors import DTypeError, ShapeError, UnsupportedError
+from stepwell.errors import AccuracyWarning, DTypeError, ShapeError, UnsupportedError
 from support import families
 from support import other_methods as other
 from support.looped import looped
+from support.refusals import refused
 from support.stability_cases import LIMITS, METHODS, known
 
 DAMPABLE = [m for m in METHODS if not sw.method(m).needs_acceleration]
-
-
-# ---- stability_limit
 
 
 @known
@@ -39,7 +35,6 @@ def test_the_record_has_the_limit(method: str) -> None:
         (other.MERSON_4, 2 * math.sqrt(3)),
         (other.FEHLBERG_4, 0.0),
         (other.FEHLBERG_5, 0.0),
-        (other.DORMAND_PRINCE_5, 0.997189),
         (other.FOREST_RUTH, 1.573401947),
         (other.PEFRL, 2.989449546),
         (other.KUTTA_3, math.sqrt(3)),
@@ -161,22 +156,18 @@ def test_a_chain_that_floats_is_limited_by_what_swings() -> None:
     assert (float(lone), lone.mode) == (math.inf, None)  # a free mass: no step is too large
 
 
-def test_limits_of_a_batch() -> None:
+def test_limits_of_a_batch_whatever_its_inputs() -> None:
     omega = np.linspace(0.5, 20.0, 50)
     limits = sw.stability_limit(sw.Oscillator(omega, 0.1), "rk4")
     assert limits.shape == limits.modes.shape == (50,)
     for i in (0, 20, 49):
         one = sw.stability_limit(sw.Oscillator(omega[i], 0.1), "rk4")
-        assert limits[i] == one
-        assert limits.modes[i].rate == one.mode.rate
+        assert (limits[i], limits.modes[i].rate) == (one, one.mode.rate)
     mixed = sw.stability_limit(sw.Oscillator(1.0, np.array([-0.1, 0.0, 0.1])), "standard_heun")
     assert mixed[0] == mixed[1] == 0.0 < mixed[2]
     assert mixed.modes[0].kind == "unstable oscillation of the exact solution too"
     assert mixed.modes[1].kind == "unstable oscillation"
     assert (2 * limits).modes is None
-
-
-def test_inputs_do_not_matter() -> None:
     driven = sw.Oscillator(1.3, 0.2, x=sw.Sinusoid(1.0, 3.0), a=0.5)
     assert sw.stability_limit(driven, "rk4") == sw.stability_limit(sw.Oscillator(1.3, 0.2), "rk4")
 
@@ -207,7 +198,9 @@ def test_limits_of_a_pendulum_and_of_a_libration_point(method: str) -> None:
     """Hanging, it is an oscillator; standing, it falls. At L4 two oscillations, of which the frame couples velocities."""
     pendulum = sw.Pendulum(3.0)
     undamped = sw.method(method).limit
-    assert sw.stability_limit(pendulum, method, at=(0.0, 0.0)) == pytest.approx(undamped / 3, rel=1e-13)
+    # Of tsit5 r₁² passes 1 with a slope of 4e-6, so that a few roundings of a step move the limit by 1e-10.
+    near = 1e-9 if method == "tsit5" else 1e-13
+    assert sw.stability_limit(pendulum, method, at=(0.0, 0.0)) == pytest.approx(undamped / 3, rel=near)
     if (
         sw.method(method).evaluations == 1 and sw.method(method).limit < math.inf
     ):  # others look at angles that the swing comes to within the step
@@ -225,15 +218,51 @@ def test_limits_of_a_pendulum_and_of_a_libration_point(method: str) -> None:
 
 def test_a_limit_at_a_state() -> None:
     """A system that is not linear, taken for linear at a state; bodies that attract each other leave it by themselves."""
-    with pytest.raises(UnsupportedError, match="is not linear; give"):
-        sw.stability_limit(sw.NBody(), "rk4")
+    refused(UnsupportedError, "is not linear; give", sw.stability_limit, sw.NBody(), "rk4")
     with pytest.raises(DTypeError, match=r"at: expected a pair \(v, y\) of blocks, got Run"):
         sw.stability_limit(sw.Pendulum(), "rk4", at=sw.integrate(sw.Pendulum(), "rk4", v=0.0, y=1.0, dt=0.1, steps=1))
-    with pytest.raises(ShapeError, match=r"v \(2,\), y \(3,\)"):
-        sw.stability_limit(sw.Pendulum(), "rk4", at=(np.zeros(2), np.zeros(3)))
+    refused(ShapeError, r"v \(2,\), y \(3,\)", sw.stability_limit, sw.Pendulum(), "rk4", at=(np.zeros(2), np.zeros(3)))
     scene = sw.scenes.clover()
     limit = sw.stability_limit(scene.system, "false_euler", at=(scene.v, scene.y))
     assert limit == 0.0
     assert limit.mode.kind.endswith("of the exact solution too")
     same = sw.stability_limit(sw.Chain(2), "false_euler", at=(np.zeros(2), np.ones(2)))
     assert same == pytest.approx(float(sw.stability_limit(sw.Chain(2), "false_euler")), rel=1e-12)
+
+
+SATURATING = {
+    "sigmoid": lambda x: 1.0 / (1.0 + np.exp(-x)),
+    "bell": lambda x: 1.0 / np.cosh(x) ** 2,
+    "ramp": lambda x: x / (1.0 - np.exp(-x)) * np.exp(-np.abs(x)),
+    "Gompertz": lambda x: np.exp(-np.exp(x)),
+}
+
+
+@looped("name", SATURATING)
+@looped("x", [-1000.0, 1000.0])
+def test_what_saturates_has_the_derivative_zero(name: str, x: float) -> None:
+    """Where the exponential overflows: forwards of one number, and backwards of several."""
+    for n in (1, 5):
+
+        @sw.system(order=1)
+        def relaxing(t: Any, y: Any) -> Any:
+            return np.stack([SATURATING[name](sum(y[k] for k in range(len(y)))) - y[i] for i in range(len(y))])
+
+        y = np.full(n, x / n)
+        assert np.array_equal(sw.jacobian(relaxing(), y=y).matrix, -np.eye(n))
+        assert sw.stability_limit(relaxing(), "rk4", y=y) == pytest.approx(2.785293563405282, rel=1e-12)
+
+
+def test_a_limit_where_derivatives_are_not_finite_is_unknown() -> None:
+    """Of the members at such a state alone."""
+
+    @sw.system(order=1)
+    def dragged(t: Any, y: Any) -> Any:
+        return -np.sqrt(y * y) * y - y
+
+    with pytest.warns(AccuracyWarning, match=r"the limit of 1 of 2 members of dragged.* is NaN, because some derivatives"):
+        limits = sw.stability_limit(dragged(), "rk4", y=np.array([0.0, 1.0]))
+    assert limits.decided.tolist() == [False, True]
+    assert np.isnan(limits[0])
+    with pytest.warns(AccuracyWarning, match=r"the limit of dragged\(\) by rk4 is NaN"):
+        assert np.isnan(sw.stability_limit(dragged(), "rk4", y=0.0))

@@ -1,7 +1,5 @@
 """Random linear systems: predictions against matrices written by hand, and against runs."""
 
-from __future__ import annotations
-
 import math
 import warnings
 from typing import Any
@@ -63,7 +61,6 @@ def test_matrix_and_limit(method: str, seed: int) -> None:
         low, high = (low, middle) if r(middle) > 1 else (middle, high)
     # Both are r₁ = 1 to some 1e-15 times the condition of the eigenvalue (here up to 1e3), over a slope of order 1.
     assert limit == pytest.approx(high, rel=1e-11)
-    assert limit.mode is not None
     assert abs(limit.mode.eigenvalue) == pytest.approx(1.0, abs=1e-12)
     assert np.abs(np.linalg.eigvals(a) - limit.mode.rate).min() < 1e-9 * fastest
 
@@ -135,7 +132,7 @@ def test_limits_and_runs_of_random_springs(method: str, seed: int) -> None:
         assert (float(np.abs(run.y[-1]).max()) < 1e7) == bounded
 
 
-def test_an_empty_block_makes_the_blocks_methods_one() -> None:
+def test_an_empty_block_and_two_equal_pairs() -> None:
     """Without velocities there is nothing to use early: False Euler is Standard Euler, and both Heuns are Heun."""
     a = np.array([[-1.0, 2.0], [-2.0, -1.0]])
     system = sw.LinearSystem(a, velocities=0)
@@ -144,6 +141,17 @@ def test_an_empty_block_makes_the_blocks_methods_one() -> None:
         np.testing.assert_array_equal(p[m], p["standard_euler"])
     for m in ("false_heun", "semi_false_heun"):
         np.testing.assert_allclose(p[m], p["standard_heun"], rtol=0, atol=1e-16)
+    # Two equal oscillators, one driving the other: a double pair on the circle grows linearly, as the exact solution does.
+    # v̇₁ = −y₁, v̇₂ = −y₂ + y₁
+    a = np.zeros((4, 4))
+    a[2, 0] = a[3, 1] = 1.0
+    a[0, 2] = a[1, 3] = -1.0
+    a[1, 2] = 1.0
+    analysis = sw.analyse(sw.LinearSystem(a), "false_euler", dt=0.5)
+    assert (analysis.kind, bool(analysis.stable)) == ("unstable oscillation (double pair)", False)
+    a[1, 2] = 0.0
+    analysis = sw.analyse(sw.LinearSystem(a), "false_euler", dt=0.5)
+    assert (analysis.kind, bool(analysis.stable)) == ("harmonic", True)
 
 
 def test_a_system_of_one_state() -> None:
@@ -161,7 +169,7 @@ def test_a_system_of_one_state() -> None:
     assert sw.stability_limit(sw.LinearSystem([[0.1]]), "rk4") == 0.0
 
 
-def test_input_matrix_of_several_inputs() -> None:
+def test_the_matrices_are_in_the_order_of_the_blocks() -> None:
     """Q of an exact hold: what a step makes of each column of B, for inputs that were not even given."""
     a, b = np.array([[-1.0, 2.0], [-2.0, -1.0]]), np.array([[1.0, 0.0, 2.0], [0.5, -1.0, 0.0]])
     system = sw.LinearSystem(a, b, velocities=0)
@@ -172,23 +180,6 @@ def test_input_matrix_of_several_inputs() -> None:
     series_of_input = h * (np.eye(2) + z / 2 + z @ z / 6 + z @ z @ z / 24) @ b
     np.testing.assert_allclose(analysis.Q, series_of_input, rtol=0, atol=1e-15)
     np.testing.assert_array_equal(sw.analyse(system, "rk4", dt=[h, 0.3]).Q[:, :, 0], analysis.Q)
-
-
-def test_resonance_of_two_equal_pairs() -> None:
-    """Two equal oscillators, one driving the other: a double pair on the circle grows linearly, as the exact solution does."""
-    # v̇₁ = −y₁, v̇₂ = −y₂ + y₁
-    a = np.zeros((4, 4))
-    a[2, 0] = a[3, 1] = 1.0
-    a[0, 2] = a[1, 3] = -1.0
-    a[1, 2] = 1.0
-    analysis = sw.analyse(sw.LinearSystem(a), "false_euler", dt=0.5)
-    assert (analysis.kind, bool(analysis.stable)) == ("unstable oscillation (double pair)", False)
-    a[1, 2] = 0.0
-    analysis = sw.analyse(sw.LinearSystem(a), "false_euler", dt=0.5)
-    assert (analysis.kind, bool(analysis.stable)) == ("harmonic", True)
-
-
-def test_the_slots_are_in_the_order_of_the_blocks() -> None:
     system = sw.LinearSystem(np.diag([-1.0, -2.0, -3.0]), velocities=[2])
     analysis = sw.analyse(system, "standard_euler", dt=0.1)
     assert analysis.slots == ["v[0]", "y[0]", "y[1]"]

@@ -1,7 +1,5 @@
 """Transfer functions, other libraries' objects as linear systems, and systems joined to larger ones (§3)."""
 
-from __future__ import annotations
-
 from types import SimpleNamespace
 from typing import Any
 
@@ -10,6 +8,7 @@ import pytest
 import stepwell as sw
 from stepwell.errors import ArgumentError, DTypeError, ShapeError, UnsupportedError
 from support.looped import assert_refused, looped
+from support.refusals import refused
 
 signal = pytest.importorskip("scipy.signal")
 
@@ -56,17 +55,14 @@ def test_the_response_is_the_ratio_of_the_polynomials(num: Any, den: Any) -> Non
     near(response(sw.TransferFunction(num, den))[0, 0], ratio(num, den))
 
 
-def test_the_matrices_are_those_of_scipy() -> None:
+def test_the_matrices_are_those_of_scipy_and_of_hoffmann() -> None:
     """The same controllable form, so that states can be taken over; equal degrees go through D."""
     ours, theirs = sw.TransferFunction(*H), signal.tf2ss(*H)
     for name, matrix in zip("ABCD", theirs, strict=True):
         assert np.array_equal(getattr(ours, name), matrix), name
     assert ours.velocities == (0,)
     assert sw.TransferFunction(*G).D is None
-
-
-def test_a_second_degree_is_an_oscillator_to_false_euler() -> None:
-    """Its states are velocity and coordinate, so that the step is Hoffmann's: z² − 2pz + q with q = 1 without damping."""
+    # Its states are velocity and coordinate, so that the step is Hoffmann's: z² − 2pz + q with q = 1 without damping.
     step = sw.analyse(sw.TransferFunction(4.0, [1.0, 0.0, 4.0]), "false_euler", dt=0.3)
     assert (step.p, step.q) == pytest.approx((1.0 - 0.5 * 0.36, 1.0), abs=1e-15)
     assert sw.TransferFunction(4.0, [1.0, 0.0, 4.0]).second_order
@@ -164,9 +160,6 @@ def test_joined_systems() -> None:
     ):
         near(response(system)[0, 0], expected)
     assert sw.series(g, h).velocities == (0, 2)
-
-
-def test_joined_systems_of_several_inputs() -> None:
     rng = np.random.default_rng(0)
     A, B, C, D = (rng.normal(size=shape) for shape in ((3, 3), (3, 2), (3, 3), (3, 2)))
     E, F, P, Q = (rng.normal(size=shape) for shape in ((2, 2), (2, 3), (2, 2), (2, 3)))
@@ -178,12 +171,19 @@ def test_joined_systems_of_several_inputs() -> None:
     assert response(sw.feedback(one, other)) == pytest.approx(np.moveaxis(closed, 0, -1), rel=1e-9, abs=1e-9)
 
 
-def test_gains_over_a_batch() -> None:
+def test_gains_over_a_batch_and_what_a_system_is_in_python() -> None:
     gains = np.array([1.0, 5.0, 20.0])
     loops = sw.feedback(gains * sw.TransferFunction(1.0, [1.0, 2.0, 0.0]))
     assert loops.batch == (3,)
     for k, gain in enumerate(gains):
         near(response(loops, (k,))[0, 0], ratio([gain], [1.0, 2.0, gain]))
+    with pytest.raises(TypeError):
+        sw.TransferFunction(*G) * "2"
+    with pytest.raises(TypeError):
+        "2" + sw.TransferFunction(*G)
+    assert repr(sw.TransferFunction(*H)) == "TransferFunction(num=[2.0, 5.0, 1.0], den=[1.0, 3.0, 0.5])"
+    assert sw.TransferFunction(*H) == sw.TransferFunction(*H)
+    assert sw.TransferFunction(*H) != sw.TransferFunction(*G)
 
 
 def test_inputs_of_joined_systems() -> None:
@@ -201,10 +201,8 @@ def test_inputs_of_joined_systems() -> None:
     assert free.with_inputs(push).x == (push,)
     assert driven.with_inputs(None).x == (None,)
     for make in (lambda: sw.series(free, driven), lambda: sw.feedback(free, driven)):
-        with pytest.raises(ArgumentError, match="expected x of the first system only"):
-            make()
-    with pytest.raises(ArgumentError, match="expected one input for both systems"):
-        sw.parallel(driven, sw.TransferFunction(*H, x=1.0))
+        refused(ArgumentError, "expected x of the first system only", make)
+    refused(ArgumentError, "expected one input for both systems", sw.parallel, driven, sw.TransferFunction(*H, x=1.0))
 
 
 def test_the_run_of_a_loop_is_that_of_its_parts() -> None:
@@ -261,16 +259,3 @@ WRONG: list[tuple[Any, type[Exception], str]] = [
 
 def test_what_is_refused() -> None:
     assert_refused(WRONG)
-
-
-def test_a_system_of_python_does_not_multiply() -> None:
-    with pytest.raises(TypeError):
-        sw.TransferFunction(*G) * "2"
-    with pytest.raises(TypeError):
-        "2" + sw.TransferFunction(*G)
-
-
-def test_reprs_and_equality() -> None:
-    assert repr(sw.TransferFunction(*H)) == "TransferFunction(num=[2.0, 5.0, 1.0], den=[1.0, 3.0, 0.5])"
-    assert sw.TransferFunction(*H) == sw.TransferFunction(*H)
-    assert sw.TransferFunction(*H) != sw.TransferFunction(*G)

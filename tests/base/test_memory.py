@@ -1,12 +1,11 @@
 """Memory: what a run takes is counted before any work, is not more than was counted, and what is not there is not asked for."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys
 import textwrap
 import tracemalloc
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -18,6 +17,7 @@ from stepwell.errors import TooLargeError
 from stepwell.runs import engine
 from stepwell.runs.engine import linear
 from support.for_each import for_each
+from support.refusals import refused
 
 LINUX = pytest.mark.skipif(sys.platform != "linux", reason="limits and peaks are asked of Linux")
 
@@ -125,8 +125,7 @@ def test_no_thread_is_started_with_the_last_of_the_memory() -> None:
         system, arguments = sw.Oscillator(np.linspace(1, 2, 5000)), dict(v=0.0, y=1.0, dt=0.1, threads=2, progress=True)
         runs = []
         for left in (60_000_000, 8_000_000):
-            used = int(open("/proc/self/statm").read().split()[0]) * resource.getpagesize()
-            resource.setrlimit(resource.RLIMIT_AS, (used + left, resource.RLIM_INFINITY))
+            leave(left)
             runs.append(sw.integrate(system, "rk4", steps=200_000, **arguments))
             print(max(threads))
             threads.clear()
@@ -211,33 +210,6 @@ def test_what_is_kept_is_counted_as_it_is() -> None:
             np.testing.assert_array_equal(run.t, 0.1 * plan.saves)
 
 
-def test_the_copies_of_a_matrix_are_counted(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Five of 1000² numbers, 38 MiB, where there are 30; as many as a run was seen to hold of a matrix of 1500² numbers."""
-    A = np.eye(1000, k=500) - np.eye(1000, k=-500)
-    monkeypatch.setattr(available_memory, "_bounds", lambda: iter([(30 * 2.0**20, "memory of this machine")]))
-    with pytest.raises(sw.errors.TooLargeError, match=r"A: the matrix and its copies need 38\.1 MiB, but 30 MiB"):
-        sw.LinearSystem(A)
-
-
-@for_each("form", ["matrix", "power"])
-def test_transition_matrices_are_counted_before_they_are_made(form: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Eight numbers for an element of 60 000 × 60 000, and three more for a power of it."""
-    monkeypatch.setattr(linear, "transition", None)  # no work is begun
-    monkeypatch.setattr(available_memory, "_bounds", lambda: iter([(200e9, "memory of this machine")]))
-    with pytest.raises(TooLargeError, match=r"the transition matrices of 60000 × 60000 numbers need (215|295) GiB.*'direct'"):
-        sw.integrate(sw.Chain(30_000), "rk4", v=0.0, y=0.0, dt=0.1, steps=10, form=form)
-
-
-def test_a_search_for_limits_is_counted_before_it_begins(monkeypatch: pytest.MonkeyPatch) -> None:
-    """60 numbers for an element of a matrix, of as many members as are searched at once, and 250 for a limit with its mode."""
-    monkeypatch.setattr(available_memory, "_bounds", lambda: iter([(100e6, "memory of this machine")]))
-    monkeypatch.setattr(limit, "Search", None)  # no work is begun
-    with pytest.raises(TooLargeError, match=r"the limits need 172 MiB.*of fewer states"):
-        sw.stability_limit(sw.LinearSystem(-np.eye(613)), "rk4")
-    with pytest.raises(TooLargeError, match=r"the limits of 100000 members need 31\d MiB"):
-        sw.stability_limit(sw.Pendulum(), "rk4", v=0.0, y=np.ones(100_000))
-
-
 def test_unit_vectors_take_the_matrices_of_their_members_some_at_a_time(monkeypatch: pytest.MonkeyPatch) -> None:
     """Each of n vectors takes an n × n matrix of its member along: all at once they were n³ numbers, and one long copy."""
     widths: list[int] = []
@@ -266,25 +238,46 @@ def of_springs(particles: int, fixed: Any = (), members: Any = ()) -> tuple[sw.S
     )
 
 
-def test_matrices_of_small_motions_are_counted_before_they_are_made(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Four times the matrix of every member, n = 80 004, 40 and 120 states, and sixty numbers for an element in the search.
+AT_REST = np.broadcast_to(0.0, (60, 20_000))
+straight = sw.system(shape=(60,))(lambda t, v, y: 0.1 * np.roll(y, 1) - y)
 
-    163 members of 40 states and 18 of 120 are searched at once, in 0.12 GB.
-    """
-    monkeypatch.setattr(available_memory, "_bounds", lambda: iter([(1.5e9, "memory of this machine")]))
-    monkeypatch.setattr(limit, "Search", None)  # no work is begun
-    springs, y = of_springs(20_001)
-    with pytest.raises(TooLargeError, match=r"the limits need 3.05e\+03 GiB"):  # 64·80 004²·8 bytes
-        sw.stability_limit(springs, "rk4", v=0.0, y=y)
-    springs, y = of_springs(10, members=(200_000,))
-    with pytest.raises(TooLargeError, match=r"the limits of 200000 members need 10.3 GiB"):  # (250 + 4·40 + 4·40²)·8 bytes each
-        sw.stability_limit(springs, "rk4", v=0.0, y=y)
-    at_rest = np.broadcast_to(0.0, (60, 20_000))
-    with pytest.raises(TooLargeError, match=r"the limits of 20000 members need 8.81 GiB"):  # (250 + 4·120 + 4·120²)·8 bytes each
-        sw.stability_limit(ring, "rk4", v=0.0, y=at_rest)
-    straight = sw.system(shape=(60,))(lambda t, v, y: 0.1 * np.roll(y, 1) - y)
-    with pytest.raises(TooLargeError, match=r"the limits of 20000 members need"):
-        sw.stability_limit(straight, "rk4", v=0.0, y=at_rest + 1.0)
+
+def limits(system: Any, y: Any = None) -> Callable[[], Any]:
+    return lambda: sw.stability_limit(system, "rk4", **({} if y is None else {"v": 0.0, "y": y}))
+
+
+def by_matrix(form: Any) -> Callable[[], Any]:
+    return lambda: sw.integrate(sw.Chain(30_000), "rk4", v=0.0, y=0.0, dt=0.1, steps=10, form=form)
+
+
+#: Free memory, what is asked for, and what it is said to need.
+COUNTED: list[tuple[float, Callable[[], Any], str]] = [
+    # Five copies of 1000² numbers, as many as a run was seen to hold of a matrix of 1500².
+    (30 * 2.0**20, lambda: sw.LinearSystem(np.eye(1000)), r"A: the matrix and its copies need 38\.1 MiB, but 30 MiB"),
+    # Eight numbers for an element of 60 000 × 60 000, and three more for a power of it.
+    (200e9, by_matrix("matrix"), "the transition matrices of 60000 × 60000 numbers need 215 GiB.*'direct'"),
+    (200e9, by_matrix("power"), "the transition matrices of 60000 × 60000 numbers need 295 GiB.*'direct'"),
+    # 60 numbers for an element of a matrix, of as many members as are searched at once, and 250 for a limit with its mode.
+    (100e6, limits(sw.LinearSystem(-np.eye(613))), "the limits need 172 MiB.*of fewer states"),
+    (100e6, limits(sw.Pendulum(), np.ones(100_000)), r"the limits of 100000 members need 31\d MiB"),
+    # Of small motions four times the matrix of every member, n = 80 004, 40 and 120 states, and sixty numbers for an element in
+    # the search: 64·80 004²·8 bytes; (250 + 4·40 + 4·40²)·8 and (250 + 4·120 + 4·120²)·8 of each member. 163 members of 40 states
+    # and 18 of 120 are searched at once, in 0.12 GB.
+    (1.5e9, limits(*of_springs(20_001)), r"the limits need 3\.05e\+03 GiB"),
+    (1.5e9, limits(*of_springs(10, members=(200_000,))), r"the limits of 200000 members need 10\.3 GiB"),
+    (1.5e9, limits(ring, AT_REST), r"the limits of 20000 members need 8\.81 GiB"),
+    (1.5e9, limits(straight, AT_REST + 1.0), "the limits of 20000 members need"),
+]
+
+
+@for_each(("free", "ask", "words"), COUNTED)
+def test_what_is_made_of_matrices_is_counted_before_it_is_made(
+    free: float, ask: Callable[[], Any], words: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(available_memory, "_bounds", lambda: iter([(free, "memory of this machine")]))
+    monkeypatch.setattr(linear, "transition", None)  # no work is begun
+    monkeypatch.setattr(limit, "Search", None)
+    refused(TooLargeError, words, ask)
 
 
 def test_a_net_that_is_mostly_fixed_is_counted_by_what_moves(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -356,3 +349,20 @@ def test_a_jacobian_takes_little_more_memory_than_it_has_numbers() -> None:
         print((resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) * 1024 - matrix.nbytes)
     """)
     assert int(output) < 20 * 16 * 2**20
+
+
+@LINUX
+def test_new_functions_take_no_more_memory_than_the_caches_hold() -> None:
+    """A function takes 12 kB and more; of those before the last few hundred nothing is left."""
+    output = aside("""
+        def used():
+            return int(open("/proc/self/statm").read().split()[1]) * resource.getpagesize()
+        def run(first):
+            for k in range(first, first + 1200):
+                system = sw.system(order=1)(lambda t, y: [y[1] * 1.0, -y[0] * (1.0 + k)])()
+                sw.integrate(system, "rk4", y=[1.0, 0.0], dt=0.01, steps=2)
+            return used()
+        before = run(0)
+        print(run(1200) - before)
+    """)
+    assert int(output) < 2e6

@@ -1,7 +1,5 @@
 """One table of the tape's operations in Python, and the core's: nothing is missing in either."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,24 +1,27 @@
 """Where files go is tried before any work, and a file that cannot be written in the end costs no result."""
 
-from __future__ import annotations
-
+import csv
 import json
+import math
 import os
 import sys
 import time
-from collections.abc import Callable
 from contextlib import suppress
+from functools import partial
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 import stepwell as sw
 from stepwell.base import paths
+from stepwell.base.tables import Table, columns_of, stacked, write_csv, write_json
 from stepwell.errors import ArgumentError, DTypeError
 from stepwell.studies.measuring import timing
 from stepwell.views import charts
 from support.commands import run_command
 from support.families import family
+from support.refusals import refused
 
 RUN = ["run", "clover", "--method", "rk4", "--steps", "5"]
 CHART = ["chart", "oscillator", "--methods", "false_euler"]
@@ -126,31 +129,16 @@ def test_charts_try_their_place_before_they_draw(tmp_path: Path, monkeypatch: py
     loci, map_, figures = charts.stability(["rk4"]), charts.stability_map("rk4", size=8), charts.figures(["rk4"])
     curves = charts.work_precision("oscillator", ["false_euler"], [100], tolerances=[])
     panel = charts.Panel((curves,))
-    whole: dict[str, Callable[[Any], Any]] = {
-        "figure": figures.plot,
-        "a method's figure": lambda path: figures.plot(path, method="rk4"),
-        "loci": loci.plot,
-        "map": map_.plot,
-        "run": picture.plot,
-        "work precision": curves.plot,
-        "panel": panel.plot,
-        "csv": picture.to_csv,
-        "json": picture.to_json,
-        "curves csv": curves.to_csv,
-        "curves json": curves.to_json,
-        "panel csv": panel.to_csv,
-        "panel json": panel.to_json,
-        "animation": picture.animate,
-        "criteria": sw.criteria(["rk4"]).to_json,
-    }
+    drawn = [figures.plot, partial(figures.plot, method="rk4"), loci.plot, map_.plot, picture.plot, curves.plot, panel.plot]
+    tables = [getattr(chart, name) for chart in (picture, curves, panel) for name in ("to_csv", "to_json")]
     drawers = ("picture", "figures_picture", "zplane_picture", "map_picture", "runs_picture", "panel_picture", "runs_animation")
     for name in drawers:
         module = __import__(f"stepwell.views.charts.{name}", fromlist=["x"])
         for drawer in ("draw", "loci", "overview", "one", "write"):
             if hasattr(module, drawer):
                 monkeypatch.setattr(module, drawer, lambda *_: pytest.fail("it drew before it looked at the path"))
-    for name, write in whole.items():
-        ending = ".gif" if name == "animation" else ".png"
+    for write in (*drawn, *tables, sw.criteria(["rk4"]).to_json, picture.animate):
+        ending = ".gif" if write == picture.animate else ".png"
         for wrong, error, why in (
             (tmp_path / "no" / f"x{ending}", ArgumentError, "No such file or directory"),
             (tmp_path, ArgumentError, "Is a directory"),
@@ -159,10 +147,9 @@ def test_charts_try_their_place_before_they_draw(tmp_path: Path, monkeypatch: py
         ):
             with pytest.raises(error, match="path: expected ") as caught:
                 write(wrong)
-            assert why in str(caught.value), name
+            assert why in str(caught.value), write
     for wrong, error in ((tmp_path / "x" / "\0", ArgumentError), (None, DTypeError)):
-        with pytest.raises(error, match="folder: expected "):
-            figures.save(wrong)
+        refused(error, "folder: expected ", figures.save, wrong)
     assert list(tmp_path.iterdir()) == []
 
 
@@ -199,7 +186,58 @@ def test_what_may_not_be_written(tmp_path: Path) -> None:
     (tmp_path / "file").touch(0o400)
     (tmp_path / "folder").mkdir(0o500)
     for path in (tmp_path / "file", tmp_path / "folder" / "x"):
-        with pytest.raises(ArgumentError, match="Permission denied"):
-            paths.file("path", path)
-    with pytest.raises(ArgumentError, match="Permission denied"):
-        paths.folder("path", tmp_path / "folder" / "deep")
+        refused(ArgumentError, "Permission denied", paths.file, "path", path)
+    refused(ArgumentError, "Permission denied", paths.folder, "path", tmp_path / "folder" / "deep")
+
+
+class Falls(Table):
+    """Two falls, each with its heights."""
+
+    def _columns(self) -> dict[str, list[Any]]:
+        return stacked(
+            {"name": name, "t": np.arange(2.0), "y": np.array(y)} for name, y in (("a", [1, 0]), ("b", [0.1, math.nan]))
+        )
+
+    def _head(self) -> dict[str, Any]:
+        return {"dt": 1.0}
+
+    def summary(self) -> list[dict[str, Any]]:
+        return [{"lowest": -math.inf}]
+
+
+ROWS = [{"name": "a", "t": 0.0, "y": 1}, {"name": "a", "t": 1.0, "y": 0}, {"name": "b", "t": 0.0, "y": 0.1}]
+
+
+def test_rows_are_those_of_the_parts_one_below_the_other() -> None:
+    rows = Falls().rows()
+    assert rows[:3] == ROWS
+    assert math.isnan(rows[3]["y"])
+    assert len(rows) == 4
+
+
+def test_csv_reads_back_as_the_rows(tmp_path: Path) -> None:
+    Falls().to_csv(tmp_path / "t.csv")
+    with (tmp_path / "t.csv").open(encoding="utf-8", newline="") as file:
+        read = list(csv.DictReader(file))
+    assert [{"name": row["name"], "t": float(row["t"]), "y": float(row["y"])} for row in read[:3]] == ROWS
+
+
+def test_json_has_head_summary_and_rows_and_null_for_what_is_not_finite(tmp_path: Path) -> None:
+    Falls().to_json(tmp_path / "t.json")
+    read = json.loads((tmp_path / "t.json").read_text(encoding="utf-8"), parse_constant=pytest.fail)
+    assert list(read) == ["dt", "summary", "rows"]
+    assert read["summary"] == [{"lowest": None}]
+    assert read["rows"] == [*ROWS, {"name": "b", "t": 1.0, "y": None}]
+
+
+def test_a_row_that_lacks_a_column_leaves_it_empty(tmp_path: Path) -> None:
+    columns = columns_of([{"a": 1}, {"a": None, "b": 2}])
+    write_csv(columns, tmp_path / "t.csv")
+    assert (tmp_path / "t.csv").read_bytes() == b"a,b\n1,\n,2\n"
+
+
+@pytest.mark.parametrize("write", [write_csv, write_json])
+def test_columns_of_unequal_length_or_no_json_leave_no_file(tmp_path: Path, write: Any) -> None:
+    with pytest.raises((TypeError, ValueError)):
+        write({"a": [1, 2], "b": [object()]}, tmp_path / "t")
+    assert list(tmp_path.iterdir()) == []

@@ -1,7 +1,5 @@
 """The progress of a long run is shown in a terminal, with rich or without, and in a notebook; in a pipe it is not."""
 
-from __future__ import annotations
-
 import io
 import sys
 from types import SimpleNamespace

@@ -1,7 +1,5 @@
 """What Windows does otherwise; elsewhere by a stand-in. ``make test-windows`` runs this file by an interpreter for Windows."""
 
-from __future__ import annotations
-
 import ctypes
 import errno
 import os
@@ -18,6 +16,7 @@ import stepwell as sw
 from stepwell.base import available_memory, files, paths, streams
 from stepwell.errors import ArgumentError
 from support.for_each import for_each
+from support.refusals import refused
 
 WINDOWS = sys.platform == "win32"
 
@@ -89,10 +88,8 @@ def test_free_memory_is_known(monkeypatch: pytest.MonkeyPatch) -> None:
 )
 def test_a_name_that_windows_does_not_have_is_refused(name: str, why: str, tmp_path: Path) -> None:
     """With a colon it would write into a hidden part of the file ``run``."""
-    with pytest.raises(ArgumentError, match=f"{why} on Windows"):
-        paths.file("path", tmp_path / name)
-    with pytest.raises(ArgumentError, match=f"{why} on Windows"):
-        paths.folder("folder", tmp_path / name)
+    refused(ArgumentError, f"{why} on Windows", paths.file, "path", tmp_path / name)
+    refused(ArgumentError, f"{why} on Windows", paths.folder, "folder", tmp_path / name)
     assert list(tmp_path.iterdir()) == []
     paths.file("path", tmp_path / "run.png")
 

@@ -3,8 +3,6 @@
 Each is a function and right arguments for it.
 """
 
-from __future__ import annotations
-
 import contextlib
 import io
 import itertools
@@ -75,44 +73,30 @@ def in_pieces(system: Any, method: Any, first: Any = 3, second: Any = 4, **optio
     return rest
 
 
-def right_run(
-    system: Any = 0,
-    method: Any = 0,
-    members: Any = 3,
-    seed: Any = 0,
-    dt: Any = 0.1,
-    steps: Any = 5,
-    every: Any = None,
-    **more: Any,
-) -> sw.Run:
-    """A right run of a system and a method that are named by numbers, which has the bits of the reference."""
-    name = list(SYSTEMS)[whole(system) % len(SYSTEMS)]
-    rng = np.random.default_rng(whole(seed) % 2**32)
-    members = whole(members) % 20 + 1
-    instance, record = SYSTEMS[name](rng, members), sw.method(METHODS[whole(method) % len(METHODS)])
-    if not fits(instance, record):
-        record = sw.method("rk4")
+def as_the_reference(instance: Any, record: Any, members: int, rng: Any, what: str, **options: Any) -> sw.Run:
+    """A run from a random state, which has the bits of the reference."""
     state = {block: rng.normal(size=(*shape, members)) for block, shape in (("v", instance.v_shape), ("y", instance.y_shape))}
-    options = {"dt": dt, "steps": steps, "every": every} | more
     run = sw.integrate(instance, record, **state, **options)
     reference = sw.integrate(instance, record, **state, **options, backend="numpy")
     for block in ("t", "v", "y", "first_bad_step"):
-        same(f"{block} of the core and the reference, {name} by {record.name}", getattr(run, block), getattr(reference, block))
+        same(f"{block} of the core and the reference, {what} by {record.name}", getattr(run, block), getattr(reference, block))
     return run
+
+
+def right_run(system: Any = 0, method: Any = 0, members: Any = 3, seed: Any = 0, **options: Any) -> sw.Run:
+    """A right run of a system and a method that are named by numbers."""
+    name = list(SYSTEMS)[whole(system) % len(SYSTEMS)]
+    rng, members = np.random.default_rng(whole(seed) % 2**32), whole(members) % 20 + 1
+    instance, record = SYSTEMS[name](rng, members), sw.method(METHODS[whole(method) % len(METHODS)])
+    record = record if fits(instance, record) else sw.method("rk4")
+    return as_the_reference(instance, record, members, rng, name, **{"dt": 0.1} | options)
 
 
 def right_adaptive_run(system: Any = 0, method: Any = 0, seed: Any = 0, tolerance: Any = 1e-3, until: Any = 0.5) -> sw.Run:
     """The same with adaptive steps."""
-    name = ADAPTIVE[whole(system) % len(ADAPTIVE)]
-    rng = np.random.default_rng(whole(seed) % 2**32)
+    name, rng = ADAPTIVE[whole(system) % len(ADAPTIVE)], np.random.default_rng(whole(seed) % 2**32)
     instance, record = SYSTEMS[name](rng, 2), sw.method(("merson", "fehlberg", "fehlberg_5", "dop853")[whole(method) % 4])
-    state = {block: rng.normal(size=(*shape, 2)) for block, shape in (("v", instance.v_shape), ("y", instance.y_shape))}
-    options = {"tolerance": tolerance, "at": [0.1, until], "max_steps": 60}
-    run = sw.integrate(instance, record, **state, **options)
-    reference = sw.integrate(instance, record, **state, **options, backend="numpy")
-    for block in ("t", "v", "y", "first_bad_step"):
-        same(f"{block} of the core and the reference, {name} by {record.name}", getattr(run, block), getattr(reference, block))
-    return run
+    return as_the_reference(instance, record, 2, rng, name, tolerance=tolerance, at=[0.1, until], max_steps=60)
 
 
 SAVED = FOLDER / "whole.npz"
@@ -167,10 +151,7 @@ MORE: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
         world_stepped,
         FREE | {"steps": 3, "again": 2, "t0": 0.0, "start_step": 0, "control": None, "force": None, "fused": False},
     ),
-    "World of bodies stepped": (
-        world_stepped,
-        BODIES | {"steps": 3, "again": 2, "start": "first_order", "resume": None},
-    ),
+    "World of bodies stepped": (world_stepped, BODIES | {"steps": 3, "again": 2, "start": "first_order", "resume": None}),
     "in pieces": (
         in_pieces,
         FREE | {"first": 3, "second": 4, "every": 2, "t0": 0.0, "form": "direct", "fused": False, "force": 0.1},
@@ -198,58 +179,10 @@ MORE: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
 #: Nothing to do with this machine: peers may not be installed.
 EVERY = {name: each for name, each in (CALLS | MORE).items() if not name.startswith("charts.peers.")}
 
-#: Arguments by which one asks for work: what takes long with them does what it was asked for.
-WORK = frozenset(
-    {
-        "steps",
-        "first",
-        "second",
-        "again",
-        "n",
-        "every",
-        "transient",
-        "observe",
-        "at",
-        "tolerance",
-        "dt",
-        "max_steps",
-        "until",
-        "size",
-    }
-    | {"t_span", "t_eval", "max_step", "first_step", "rtol", "atol", "y0", "phi", "periods", "horizon", "evaluations", "gains"}
-    | {"planks", "modes", "methods", "scenes", "scene", "tolerances", "settings", "exponents", "axes", "masses", "members"}
-    | {
-        "system",
-        "method",
-        "v",
-        "y",
-        "fun",
-        "events",
-        "a",
-        "b",
-        "c",
-        "d",
-        "e",
-        "f",
-        "g",
-        "relative",
-        "t0",
-        "near",
-        "chunk",
-        "threads",
-    }
-    | {
-        "frame",
-        "amplitude",
-        "e",
-        "share",
-        "budget",
-        "cost",
-        "transient",
-        "args",
-        "most",
-        "spin",
-        "start_step",
-        "backend",
-    }
-)
+WORK = frozenset({
+    "steps", "first", "second", "again", "n", "every", "transient", "observe", "at", "tolerance", "dt", "max_steps", "until",
+    "size", "t_span", "t_eval", "max_step", "first_step", "rtol", "atol", "y0", "phi", "periods", "horizon", "evaluations",
+    "gains", "planks", "modes", "methods", "scenes", "scene", "tolerances", "settings", "exponents", "axes", "masses",
+    "members", "system", "method", "v", "y", "fun", "events", "a", "b", "c", "d", "e", "f", "g", "relative", "t0", "near",
+    "chunk", "threads", "frame", "amplitude", "share", "budget", "cost", "args", "most", "spin", "start_step", "backend",
+})  # fmt: skip

@@ -4,8 +4,6 @@ Each way to write a file is tried with several limits of its size, from nothing 
 nothing is left beside it, and the error says what is wrong.
 """
 
-from __future__ import annotations
-
 import json
 import resource
 import signal

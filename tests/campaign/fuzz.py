@@ -6,8 +6,6 @@ is reported with the call that made it. What is found goes to a file, from where
 test_campaign.py tries in every run.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import os

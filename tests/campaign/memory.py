@@ -4,8 +4,6 @@ Each kind of run is made so many times in a process of its own. After a tenth of
 tapes, kernels, the allocator's own room) is there; what the process has at the end beyond that is a leak.
 """
 
-from __future__ import annotations
-
 import argparse
 import gc
 import json

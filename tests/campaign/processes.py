@@ -1,7 +1,5 @@
 """Processes that fork, are spawned, or are killed: ``python -m campaign.processes --seconds 60``, in the folder of tests."""
 
-from __future__ import annotations
-
 import argparse
 import hashlib
 import multiprocessing
@@ -160,7 +158,6 @@ def killed_writers(times: int, ending: str) -> int:
         path = Path(folder) / f"run{ending}"
         for _ in range(times):
             writer = subprocess.Popen([sys.executable, "-c", WRITER, str(path)], stdout=subprocess.PIPE)
-            assert writer.stdout is not None
             writer.stdout.readline()
             time.sleep(0.05 + 0.2 * draw.random() if path.exists() else 1.0)
             writer.kill()

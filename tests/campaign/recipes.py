@@ -3,8 +3,6 @@
 A recipe is either whole (a number, an array of some type and layout, an object) or says what is changed in the right value.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

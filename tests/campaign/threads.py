@@ -4,8 +4,6 @@ With the GIL, and with a Python that has none. Every number is compared with tha
 refused by stepwell's own error, and what is refused was not done.
 """
 
-from __future__ import annotations
-
 import argparse
 import copy
 import pickle

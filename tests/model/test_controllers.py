@@ -5,23 +5,26 @@ from __future__ import annotations
 import copy
 import itertools
 import pickle
+import shutil
 from typing import Any
 
 import numpy as np
 import pytest
 import stepwell as sw
-from stepwell import _core
+from stepwell._core import Tape
 from stepwell.errors import ArgumentError, DTypeError, ShapeError, StepwellError, TraceError, UnknownNameError, UnsupportedError
 from stepwell.model.controllers import Timing
-from stepwell.reference import sampled
+from stepwell.reference import functions, sampled
 from stepwell.reference.traced import Tracer
 from stepwell.runs import engine
 from stepwell.runs.options import Options
 from stepwell.runs.request import Request
 from support.abroad import Journey, run
+from support.calls import assert_raises
+from support.cases import assert_same
 from support.export import assert_same as assert_same_bits
-from support.export import languages
-from support.graphs import assert_one_graph
+from support.export import example, languages, printed
+from support.graphs import assert_one_graph, assert_plan_is_traced_alike
 from support.looped import looped
 from support.mistakes import mistaken
 from support.own_methods import adams_bashforth_2
@@ -61,7 +64,17 @@ def several(t: Any, v: Any, y: Any, seen: Any = (0.0, 0.0), k: Any = 1.0, *, gai
     return gain * y[0] + seen[1], np.array([k, -k]), y + 0.5 * seen, 0.9 * k + np.sin(t)
 
 
+def energy(v: Any, y: Any, *, u: Any) -> Any:
+    return 0.5 * v**2 + 0.5 * y**2 - u * y
+
+
+@sw.controller
+def of_output(t: Any, z: Any, *, gain: Any = 0.8) -> Any:
+    return -gain * z[0]
+
+
 GAINS = np.array([0.5, 1.0, 2.0])
+PLANT = sw.LinearSystem([[-0.4, 0.0], [1.0, 0.0]], [[4.0], [0.0]], [[0.0, 1.0]], x=0.0)
 #: Periods and delays in steps: results are put out at the sample itself, at later ones, and between two.
 TIMES = [(1, 0), (1, 1), (1, 3), (10, 0), (10, 10), (10, 30), (10, 3), (10, 13), (4, 7)]
 #: Methods of all kinds that carry v.
@@ -78,6 +91,26 @@ def loop(period: int = 10, delay: int = 0, *, gain: Any = GAINS, system: Any = N
 def loop_of_two(period: int, delay: int) -> sw.System:
     """One whose controller sets two parameters and has a state of three numbers, for steps of 0.05."""
     return driven().surrounded(several(sets=("u", "w"), gain=GAINS, period=0.05 * period, delay=0.05 * delay))
+
+
+@sw.controller
+def other(t: Any, v: Any, y: Any, seen: Any = 0.5, *, gain: Any = 0.7) -> Any:
+    return np.array([-gain * y[1], seen - v[0]]), 0.5 * seen + np.sin(t)
+
+
+@sw.controller
+def first(t: Any, v: Any, y: Any, total: Any = 0.0, *, gain: Any = 0.5, k: Any = 0.1) -> Any:
+    return gain * y[0] + total, total - k * y[1]
+
+
+def two(times: tuple[int, int, int, int] = (4, 7, 6, 3), gain: Any = GAINS) -> sw.System:
+    """One with two controllers of these periods and delays in steps of 0.05."""
+    p, d, q, e = (0.05 * each for each in times)
+    return driven().surrounded(first(gain=gain, period=p, delay=d)).surrounded(other(sets="w", period=q, delay=e))
+
+
+def clocked() -> sw.System:
+    return sw.Oscillator(2.0, x=0.0).surrounded(clock(sets="x", period=0.04))
 
 
 def linear_loop() -> Any:
@@ -108,15 +141,50 @@ def run_of(system: sw.System, steps: int = 97, method: Any = "rk4", **options: A
     return sw.integrate(system, method, **({"v": 0.0, "y": 0.0, "dt": 0.01, "steps": steps, "every": 1} | options))
 
 
-def assert_same(one: sw.Run, other: sw.Run) -> None:
-    for name in ("v", "y", "carry"):
-        np.testing.assert_array_equal(getattr(one, name), getattr(other, name), strict=True)
+def by_both(*arguments: Any, **options: Any) -> sw.Run:
+    """By the core, which is as by the reference."""
+    runs = [run_of(*arguments, **options, backend=backend) for backend in ("rust", "numpy")]
+    assert_same(*runs)
+    return runs[0]
 
 
 @looped("period, delay", TIMES)
 def test_it_is_the_loop_that_users_write_over_a_world(period: int, delay: int) -> None:
-    for backend in ("rust", "numpy"):
-        np.testing.assert_array_equal(run_of(loop(period, delay), backend=backend).y[1:], by_hand(period, delay, 97))
+    np.testing.assert_array_equal(by_both(loop(period, delay)).y[1:], by_hand(period, delay, 97))
+
+
+@looped("times", [(1, 0, 1, 0), (1, 0, 3, 0), (4, 7, 6, 3), (7, 0, 5, 12), (10, 10, 3, 0)])
+def test_two_controllers_are_the_loop_that_users_write_over_a_world(times: tuple[int, int, int, int]) -> None:
+    """Each has its own period and delay, in whichever order they came; what they put out is recorded."""
+    p, d, q, e = times
+    v, y = (block.copy() for block in (STATE["v"], STATE["y"]))
+    total, seen = np.zeros(3), np.full(3, 0.5)
+    world = sw.World(driven(u=np.full(3, 0.1), w=np.array([[0.1] * 3, [0.2] * 3])), "rk4", v=v, y=y, dt=0.05)
+    late: dict[str, dict[int, Any]] = {"u": {}, "w": {}}
+    states, put_out = [y.copy()], [np.array([[0.1] * 3, [0.1] * 3, [0.2] * 3])]
+    for k in range(47):
+        if k % p == 0:
+            late["u"][k + d], total = GAINS * y[0] + total, total - 0.1 * y[1]
+        if k % q == 0:
+            late["w"][k + e], seen = np.array([-0.7 * y[1], seen - v[0]]), 0.5 * seen + float(functions.sin(k * 0.05))
+        for name, each in late.items():
+            if k in each:
+                world.parameters[name][...] = each[k]
+        world.step()
+        states.append(y.copy())
+        put_out.append(np.array([world.parameters["u"], *world.parameters["w"]]))
+    around = first(gain=GAINS, period=0.05 * p, delay=0.05 * d), other(sets="w", period=0.05 * q, delay=0.05 * e)
+    for one, after in (around, around[::-1]):
+        system = driven().surrounded(one).surrounded(after)
+        run = by_both(system, 47, dt=0.05, **STATE, record=("w", "u"))
+        np.testing.assert_array_equal(run.y, states)
+        np.testing.assert_array_equal(run.recorded["u"], np.array(put_out)[:, 0])
+        np.testing.assert_array_equal(run.recorded["w"], np.array(put_out)[:, 1:])
+        every = by_both(system, 47, dt=0.05, **STATE, record="w", every=5)
+        np.testing.assert_array_equal(every.recorded["w"][:-1], run.recorded["w"][::5])
+        single = by_both(system, 47, dt=0.05, **STATE, record="u", dtype="float32")
+        np.testing.assert_allclose(single.recorded["u"], run.recorded["u"], atol=1e-5)
+        assert np.array_equal(single.recorded["u"], run.recorded["u"].astype(np.float32)) is False
 
 
 @looped("period, delay", [(11, 13), (9, 13), (10, 12), (10, 14)])
@@ -141,17 +209,20 @@ def test_a_period_or_delay_that_is_off_by_a_step_is_another_motion(period: int, 
 )
 def test_it_has_the_same_bits_in_every_way(method: Any, delay: int, numbers: dict[str, Any]) -> None:
     """What it remembers goes along with a run, its file and its world; a method may keep blocks beside it."""
-    run = assert_equal_ways(loop_of_two(4, delay), method, **STATE, dt=0.05, steps=21, every=3, **numbers)
-    assert np.isfinite(run.y).all()
+    for system, record in ((loop_of_two(4, delay), ()), (two(), ("u", "w"))):
+        run = assert_equal_ways(system, method, **STATE, dt=0.05, steps=21, every=3, record=record, **numbers)
+        assert np.isfinite(run.y).all()
+        assert list(run.recorded) == list(record)
 
 
 @looped("method, delay", itertools.product([*METHODS, adams_bashforth_2], [0, 7]))
 def test_a_step_is_one_graph(method: Any, delay: int) -> None:
-    single: dict[str, Any] = {"v": np.zeros(2), "y": np.ones(2), "dt": 0.05, "steps": 1}
-    plan = Request.of(loop_of_two(4, delay), method, Options(**single)).plan
-    tape = _core.Tape()
-    core = tape.trace(engine.model(plan), "step")
-    assert_one_graph(tape, core, Tracer(plan.system, tape).step(plan.method))
+    one = Options(v=np.zeros(2), y=np.ones(2), dt=0.05, steps=1, record=("w", "u"))
+    for system in (loop_of_two(4, delay), two((4, delay, 6, 3))):
+        plan = Request.of(system, method, one).plan
+        assert_plan_is_traced_alike(plan, "step")
+        tape = Tape()
+        assert_one_graph(tape, tape.trace(engine.model(plan), "record w")[-2:], Tracer(plan.system, tape).record(["w"]))
 
 
 def test_what_it_sets_has_no_derivative_in_a_step() -> None:
@@ -166,11 +237,14 @@ def test_what_it_sets_has_no_derivative_in_a_step() -> None:
 @looped("samples", [0, 1, 3])
 def test_without_saturation_it_is_the_loop_of_samples(samples: int) -> None:
     """``sampled_loop`` has the exact solution of the plant between samples; a series of order 25 is exact but for rounding."""
-    plant = sw.LinearSystem([[-0.4, 0.0], [1.0, 0.0]], [[4.0], [0.0]], [[0.0, 1.0]], x=0.0)
-    steps = sw.sampled_loop(plant, 0.8, 0.1, samples=samples)
-    system = plant.surrounded(proportional(sets="x", period=0.1, delay=0.1 * samples))
+    steps = sw.sampled_loop(PLANT, 0.8, 0.1, samples=samples)
+    system = PLANT.surrounded(proportional(sets="x", period=0.1, delay=0.1 * samples))
     start = np.array([0.3, 0.25])
     run = sw.integrate(system, "taylor", y=start, dt=0.1, steps=50, every=1)
+    plant = sw.TransferFunction(4.0, [1.0, 0.4, 0.0], x=0.0)  # its states are that output over 4, and its rate
+    of_z = plant.surrounded(of_output(sets="x", period=0.1, delay=0.1 * samples))
+    by_output = sw.integrate(of_z, "taylor", v=start[:1] / 4.0, y=start[1:] / 4.0, dt=0.1, steps=50, every=1)
+    np.testing.assert_allclose(by_output.z[:, 0], run.y[:, 1], rtol=0.0, atol=2e-12)
     state = np.zeros(len(steps.P))
     state[:2] = start
     for k in range(51):
@@ -246,6 +320,22 @@ def test_what_the_controller_sets_cannot_be_set() -> None:
             call()
 
 
+def test_an_energy_that_reads_what_it_sets_is_refused() -> None:
+    """It changes with what is set, so what a function of v and y alone says of it is wrong."""
+    pulled = sw.system(lambda t, v, y, *, u=0.0: u - y)
+    pulled.invariant(energy)
+    run = run_of(pulled().surrounded(clock(period=0.1)), 20)
+    for call in (lambda: run.energy, lambda: run_of(run.system, record="energy")):
+        with pytest.raises(UnsupportedError, match=r"energy: that of .* reads a parameter that changes with the time"):
+            call()
+
+
+def test_outputs_that_a_controller_reads_are_part_of_the_step() -> None:
+    world = sw.World(PLANT.surrounded(of_output(sets="x", period=0.1)), "rk4", y=np.zeros(2), dt=0.1)
+    with pytest.raises(UnsupportedError, match="C: the sampled controller reads outputs by it"):
+        world.set(C=[[0.0, 2.0]])
+
+
 def test_friction_of_own_equations_sees_what_it_sets() -> None:
     @sw.system
     def sled(t: Any, v: Any, y: Any, *, u: Any = 0.0) -> Any:
@@ -255,13 +345,8 @@ def test_friction_of_own_equations_sees_what_it_sets() -> None:
     def grip(t: Any, v: Any, y: Any, *, u: Any) -> Any:
         return 0.1 + 0.2 * u * u
 
-    @sw.controller
-    def push(t: Any, v: Any, y: Any) -> Any:
-        return 1.0 - y
-
-    runs = [run_of(sled().surrounded(push(period=0.04)), 97, backend=backend) for backend in ("rust", "numpy")]
-    assert_same(*runs)
-    assert runs[0].y[-1] > 0.0
+    push = sw.controller(lambda t, v, y: 1.0 - y)
+    assert by_both(sled().surrounded(push(period=0.04)), 97).y[-1] > 0.0
 
 
 def test_a_sweep_over_its_parameters_and_its_period() -> None:
@@ -276,7 +361,8 @@ def test_a_sweep_over_its_parameters_and_its_period() -> None:
 
 def test_its_times_are_those_of_the_steps() -> None:
     """Also where members have times of their own, and back in time."""
-    v = run_of(mass().surrounded(clock(period=0.04)), 9, t0=2.0).v
+    system = mass().surrounded(clock(period=0.04))
+    v = run_of(system, 9, t0=2.0).v
     expected, w = [], 0.0
     for k in range(9):
         u = 2.0 + (k - k % 4) * 0.01
@@ -284,12 +370,8 @@ def test_its_times_are_those_of_the_steps() -> None:
         w = float(run.v[-1])
         expected.append(w)
     np.testing.assert_array_equal(v[1:], expected)
-    own = run_of(mass().surrounded(clock(period=0.04)), 9, t0=np.array([0.0, 2.0]))
-    np.testing.assert_array_equal(own.v[:, 1], v)
-    numpy = run_of(mass().surrounded(clock(period=0.04)), 9, t0=np.array([0.0, 2.0]), backend="numpy")
-    assert_same(own, numpy)
-    back = run_of(mass().surrounded(clock(period=0.04)), 9, dt=-0.01)
-    assert_same(back, run_of(mass().surrounded(clock(period=0.04)), 9, dt=-0.01, backend="numpy"))
+    np.testing.assert_array_equal(by_both(system, 9, t0=np.array([0.0, 2.0])).v[:, 1], v)
+    by_both(system, 9, dt=-0.01)
 
 
 def test_inputs_of_built_in_systems_and_other_parts_beside_it() -> None:
@@ -301,9 +383,8 @@ def test_inputs_of_built_in_systems_and_other_parts_beside_it() -> None:
         (mass(), clock(period=0.04), {"v": 0.0, "y": 1.0, "force": np.array([0.1, 0.2])}),
     ]
     for system, controller, start in systems:
-        runs = [run_of(system.surrounded(controller), 30, **start, backend=backend) for backend in ("rust", "numpy")]
-        assert_same(*runs)
-        assert not np.array_equal(runs[0].y[-1], run_of(system, 30, **start).y[-1])
+        run = by_both(system.surrounded(controller), 30, **start)
+        assert not np.array_equal(run.y[-1], run_of(system, 30, **start).y[-1])
 
 
 def test_a_long_step_is_one_tape() -> None:
@@ -311,14 +392,8 @@ def test_a_long_step_is_one_tape() -> None:
     n = 70
     matrix = np.diag(-np.ones(n)) + np.diag(np.ones(n - 1), 1)
     plant = sw.LinearSystem(matrix, np.ones((n, 1)), x=0.0, velocities=0)
-
-    @sw.controller
-    def push(t: Any, y: Any) -> Any:
-        return -0.1 * y[0]
-
-    start = {"v": np.zeros((0,)), "y": np.linspace(0.0, 1.0, n)}
-    runs = [run_of(plant.surrounded(push(sets="x", period=0.04)), 12, **start, backend=each) for each in ("rust", "numpy")]
-    assert_same(*runs)
+    push = sw.controller(lambda t, y: -0.1 * y[0])
+    by_both(plant.surrounded(push(sets="x", period=0.04)), 12, v=np.zeros(0), y=np.linspace(0.0, 1.0, n))
 
 
 @pytest.mark.mutant
@@ -339,15 +414,7 @@ def test_a_reference_with_a_mistake_is_noticed(old: str, new: str, monkeypatch: 
 
 def test_what_it_sets_is_held_in_all_stages_of_a_step() -> None:
     """A plant that is told its state in each stage moves otherwise."""
-
-    @sw.system
-    def told(t: Any, v: Any, y: Any, *, gain: Any = 1.0) -> Any:
-        return -gain * y - 0.4 * v
-
-    @sw.controller
-    def back(t: Any, v: Any, y: Any) -> Any:
-        return -y
-
+    told, back = sw.system(lambda t, v, y: -y - 0.4 * v), sw.controller(lambda t, v, y: -y)
     held = run_of(mass().surrounded(back(period=0.01)), v=0.0, y=1.0)
     assert not np.array_equal(held.y, run_of(told(), v=0.0, y=1.0).y)
     np.testing.assert_allclose(held.y[1], 1.0 - 0.5e-4, atol=1e-6)
@@ -361,11 +428,10 @@ def test_its_period_is_found_by_the_nearest_whole_number_of_steps() -> None:
 
 @looped("dt, samples", itertools.product([0.1, 0.2, 0.3], [0, 1, 3]))
 def test_near_a_state_it_is_the_loop_of_samples(dt: float, samples: int) -> None:
-    plant = sw.LinearSystem([[-0.4, 0.0], [1.0, 0.0]], [[4.0], [0.0]], [[0.0, 1.0]], x=0.0)
-    system = plant.surrounded(proportional(sets="x", period=dt, delay=samples * dt))
+    system = PLANT.surrounded(proportional(sets="x", period=dt, delay=samples * dt))
     for steps in (1, 5):
         near = sw.linearised_loop(system, "taylor", dt=dt / steps, y=np.zeros(2))
-        true = sw.sampled_loop(plant, 0.8, dt, samples=samples)
+        true = sw.sampled_loop(PLANT, 0.8, dt, samples=samples)
         assert near.radius == pytest.approx(true.radius, rel=1e-11)
         assert near.period == pytest.approx(dt)
 
@@ -383,39 +449,36 @@ def test_a_loop_grows_where_its_radius_is_above_one(gain: float, grows: bool) ->
 
 def test_the_derivative_over_a_period_is_that_of_runs() -> None:
     """By differences, of all that is remembered, for each member, for an explicit and an implicit method."""
-    for method in ("rk4", "rodas4"):
-        system, start = loop_of_two(4, 7), {"v": STATE["v"], "y": STATE["y"]}
+    cases = [("rk4", loop_of_two(4, 7), 4, 4 + 3 + 6 + 3), ("rodas4", loop_of_two(4, 7), 4, 4 + 3 + 6 + 3)]
+    for method, system, steps, size in [*cases, ("rk4", two(), 12, 16)]:
+        start = {"v": STATE["v"], "y": STATE["y"]}
         near = sw.linearised_loop(system, method, dt=0.05, **start)
-        assert near.P.shape == (4 + 3 + 6 + 3, 4 + 3 + 6 + 3, 3)
+        assert near.P.shape == (size, size, 3)
+        assert near.period == pytest.approx(0.05 * steps)
+        counters = system.over_steps(sw.method(method), 0.0, 0.05).controller.counters(system)
         for i, name in enumerate(("v", "v", "y", "y")):
             ends = []
             for sign in (1.0, -1.0):
                 moved = {key: block.copy() for key, block in start.items()}
                 moved[name][i % 2] += sign * 1e-5
-                run = sw.integrate(system, method, **moved, dt=0.05, steps=4)
-                ends.append(np.concatenate([run.v[-1], run.y[-1], run.carry[3:]]))
+                run = sw.integrate(system, method, **moved, dt=0.05, steps=steps)
+                remembered = np.delete(run.carry[2:], counters, axis=0)
+                ends.append(np.concatenate([run.v[-1], run.y[-1], remembered]))
             np.testing.assert_allclose(near.P[:, i], (ends[0] - ends[1]) / 2e-5, rtol=1e-7, atol=1e-9)
 
 
 def exported(language: str) -> list[Journey]:
     """One whose results wait, two that set several parameters, with parameters that the code changes, a series, and float32."""
     start = {"v": STATE["v"], "y": STATE["y"], "dt": 0.05, "member": 1, "steps": 23}
+    changed = {"changed": {"controller_gain": 2.0}, "twin": loop(10, 13, gain=2.0)}
     every = [
         Journey(loop(10, 13), "rk4", np.zeros(3), np.zeros(3), dt=0.01, member=2, steps=41),
         Journey(loop_of_two(4, 0), "rk4", **start),
         Journey(loop_of_two(4, 7), "rodas4", **start),
         Journey(loop_of_two(4, 4), "taylor", **start),
-        Journey(sw.Oscillator(2.0, x=0.0).surrounded(clock(sets="x", period=0.04)), "merson", 0.5, 1.0, dt=0.01, steps=23),
-        Journey(
-            loop(10, 13, gain=1.0),
-            "rk4",
-            0.0,
-            0.0,
-            dt=0.01,
-            steps=41,
-            changed={"controller_gain": 2.0},
-            twin=loop(10, 13, gain=2.0),
-        ),
+        Journey(two(), "rk4", **start),
+        Journey(clocked(), "merson", 0.5, 1.0, dt=0.01, steps=23),
+        Journey(loop(10, 13, gain=1.0), "rk4", 0.0, 0.0, **changed, dt=0.01, steps=41),
         Journey(loop(10, 13), "rk4", np.zeros(3), np.zeros(3), dt=0.01, member=2, steps=41, options={"dtype": "float32"}),
     ]
     if language not in ("csharp", "javascript"):
@@ -436,7 +499,66 @@ def test_an_exported_controller_computes_at_samples_only() -> None:
     assert "            a3 = memory_1 + (self.controller_gain * a2 - 1.5 * v)\n" in within
 
 
+@pytest.mark.skipif(shutil.which("cc") is None, reason="there is no compiler of C here")
+def test_a_controller_alone_puts_out_what_it_does_in_the_loop(tmp_path: Any) -> None:
+    """From the states of a run, as a program measures them; what it puts out stands where the head of the file says."""
+    run = run_of(two(), 31, dt=0.05, **STATE, record=("u", "w"))
+    step = sw.export(two(), "controller", "python", dt=0.05, member=1)
+    assert "Set by the controller: u at memory[12], w at memory[13], memory[14]" in step.source
+    made: dict[str, Any] = {"__name__": "made"}
+    exec(step.source, made)
+    box = made["DrivenController"]()
+    s = box.start(run.v[0, :, 1], run.y[0, :, 1])
+    for k in range(31):
+        s.v, s.y = run.v[k, :, 1].tolist(), run.y[k, :, 1].tolist()
+        box.step(s)
+        assert s.memory[12:] == [run.recorded["u"][k + 1, 1], *run.recorded["w"][k + 1, :, 1]]
+        assert (s.v, s.y) == (run.v[k, :, 1].tolist(), run.y[k, :, 1].tolist())
+    s = box.start([0.0, 0.0], [1.0, 2.0])
+    for _ in range(1000):
+        box.step(s)
+    in_c = sw.export(two(), "controller", "c", dt=0.05, member=1)
+    assert printed(in_c, example(in_c).replace("s.y[0]", "s.memory[13]"), tmp_path) == s.memory[13]
+
+
+def run_around(function: Any) -> sw.Run:
+    return run_of(mass().surrounded(sw.controller(function)(period=0.1)))
+
+
+REST: dict[str, Any] = {"v": np.zeros(3), "y": np.zeros(3)}
 WRONG: list[tuple[Any, type[StepwellError], str]] = [
+    (
+        lambda: sw.controller(lambda t, x, total=0.0, *, gain=1.0: gain * x),
+        ArgumentError,
+        r"got \(t, x, total=0.0, \*, gain=1.0\): the state is called y here, got x",
+    ),
+    (lambda: loop().surrounded(clock(period=0.2)), UnsupportedError, "part: the system has the controller .* sets u as well"),
+    (
+        lambda: two().surrounded(other(sets="w", period=1.0)),
+        UnsupportedError,
+        "first.* and other.* already, which sets w as well",
+    ),
+    (
+        lambda: mass().surrounded(sw.controller(lambda t, z: z[0])(period=0.1)),
+        UnsupportedError,
+        r"expected a linear system with outputs \(C\) for a controller of \(t, z",
+    ),
+    (
+        lambda: sw.TransferFunction([2.0, 1.0], [0.5, 1.0], x=0.0).surrounded(of_output(sets="x", period=0.1)),
+        UnsupportedError,
+        r"adds inputs to its outputs \(D\)",
+    ),
+    (
+        lambda: (
+            driven()
+            .surrounded(first(period=0.1))
+            .surrounded(sw.controller(lambda t, v, y, *, gain=1.0, gain_u=1.0: y)(sets="w", period=0.1))
+        ),
+        ArgumentError,
+        "part: expected parameters of .* that differ by name, got gain_u, k, gain_w",
+    ),
+    (lambda: run_of(loop(), record="w"), UnknownNameError, "record: there is no 'w'"),
+    (lambda: run_of(loop(), record="u").quantity("u"), UnknownNameError, "u"),
     (lambda: sw.controller(3), DTypeError, "expected a Python function"),
     (lambda: sw.controller(limited), DTypeError, "limited is a controller already"),
     (lambda: sw.controller(lambda y, t: y), ArgumentError, r"expected a function \(t, v, y"),
@@ -456,101 +578,56 @@ WRONG: list[tuple[Any, type[StepwellError], str]] = [
     (lambda: sw.Oscillator().surrounded(clock(period=0.1, sets="x")), ArgumentError, "give it the value .* x=0.0"),
     (lambda: sw.Oscillator(x=0.0).surrounded(clock(period=0.1, sets="omega")), UnknownNameError, "may have any value"),
     (lambda: mass().surrounded(proportional(period=0.1)), ArgumentError, r"expected a controller of \(t, v, y"),
-    (
-        lambda: sw.LinearSystem(-np.eye(2), np.ones(2), np.ones(2), x=0.0).surrounded(clock(sets="x", period=0.1)),
-        ArgumentError,
-        "no velocities",
-    ),
+    (lambda: PLANT.surrounded(clock(sets="x", period=0.1)), ArgumentError, "no velocities"),
     (lambda: run_of(mass().surrounded(limited(period=0.015))), ArgumentError, r"period: .* 1.5; take dt = 0.0075"),
-    (
-        lambda: run_of(mass().surrounded(limited(period=0.1, delay=0.015))),
-        ArgumentError,
-        "delay: expected a whole number of steps",
-    ),
+    (lambda: run_of(mass().surrounded(limited(period=0.1, delay=0.015))), ArgumentError, "delay: expected a whole number"),
     (lambda: run_of(mass().surrounded(limited(period=0.001))), ArgumentError, "period"),
     (lambda: run_of(mass().surrounded(limited(period=1e9))), ArgumentError, "period: expected less than 16777216 steps"),
     (lambda: run_of(mass().surrounded(limited(period=0.01, delay=100.0))), ArgumentError, "at most 1000 periods"),
-    (
-        lambda: run_of(sw.Oscillator(x=0.0).surrounded(clock(sets="x", period=0.1)), method="leapfrog"),
-        UnsupportedError,
-        "leapfrog carries v_half",
-    ),
-    (
-        lambda: run_of(sw.Oscillator(x=0.0).surrounded(clock(sets="x", period=0.1)), method="verlet"),
-        UnsupportedError,
-        "verlet carries y_prev",
-    ),
+    (lambda: run_of(clocked(), method="leapfrog"), UnsupportedError, "leapfrog carries v_half"),
+    (lambda: run_of(clocked(), method="verlet"), UnsupportedError, "verlet carries y_prev"),
     (lambda: run_of(loop(), method="exact"), UnsupportedError, "exact"),
     (lambda: run_of(loop(), form="matrix"), UnsupportedError, "form"),
     (
-        lambda: sw.integrate(loop(), "dop853", v=0.0, y=0.0, tolerance=1e-6, at=[1.0]),
+        lambda: run_of(loop(), method="dop853", dt=None, steps=None, every=None, tolerance=1e-6, at=[1.0]),
         UnsupportedError,
         "tolerance: does not go with a sampled controller: a controller samples at whole numbers of steps",
     ),
     (lambda: run_of(loop(), events=lambda t, v, y: y - 0.5), UnsupportedError, "events: does not go with a sampled controller"),
-    (
-        lambda: sw.World(loop(), "rk4", v=np.zeros(3), y=np.zeros(3), dt=0.01, events=lambda t, v, y: y),
-        UnsupportedError,
-        "events: does not go with a sampled controller",
-    ),
-    (lambda: mass().surrounded(named_alike(period=0.1)), ArgumentError, "by other names than those of the system.*got u"),
-    (lambda: sw.stability_limit(loop(), "rk4"), UnsupportedError, "sampled controller"),
-    (lambda: sw.analyse(loop(), "rk4", dt=0.01), UnsupportedError, "sampled controller"),
-    (lambda: sw.jacobian(loop(), v=0.0, y=0.0), UnsupportedError, "sampled controller"),
-    (lambda: sw.lyapunov(loop(), "rk4", v=0.0, y=0.0, dt=0.01, steps=10), UnsupportedError, "sampled controller"),
-    (
-        lambda: sw.export(loop(), "rk4", "c", dt=0.3),
-        ArgumentError,
-        "period: expected a whole number of steps, got 0.1 with dt = 0.3",
-    ),
+    (lambda: sw.World(loop(), "rk4", **REST, dt=0.01, events=lambda t, v, y: y), UnsupportedError, "events: does not go with"),
+    (lambda: run_around(lambda t, v, y, *, u=1.0: u * y), ArgumentError, "by other names than those of the system.*got u"),
+    (lambda: sw.export(mass(), "controller", "c"), ArgumentError, "method: expected a sampled controller around the system"),
+    (lambda: sw.export(loop(), "rk4", "c", dt=0.3), ArgumentError, "period: expected .* steps, got 0.1 with dt = 0.3"),
     (lambda: sw.linearised_loop(mass(), "rk4", dt=0.01, v=0.0, y=0.0), ArgumentError, "a sampled controller around it"),
     (lambda: sw.linearised_loop(loop(), adams_bashforth_2, dt=0.01, v=0.0, y=0.0), UnsupportedError, "more than v and y"),
     (lambda: sw.linearised_loop(loop(), "rk4", dt=0.03, v=0.0, y=0.0), ArgumentError, "period: expected a whole number"),
     (lambda: sw.linearised_loop(loop(), "rk4", dt=1e-7, v=0.0, y=0.0), ArgumentError, "at most 100000 steps in a period"),
-    (lambda: sw.discretise(linear_loop(), 0.1), UnsupportedError, "sampled controller"),
-    (lambda: sw.sampled_loop(linear_loop(), 0.8, 0.1), UnsupportedError, "sampled controller"),
-    (lambda: sw.LinearSystem.of(linear_loop()), UnsupportedError, "sampled controller"),
-    (lambda: sw.frequency_response(linear_loop(), 1.0), UnsupportedError, "sampled controller"),
-    (lambda: sw.margins(linear_loop()), UnsupportedError, "sampled controller"),
-    (lambda: 2.0 * linear_loop(), UnsupportedError, "sampled controller"),
-    (lambda: linear_loop() * linear_loop(), UnsupportedError, "sampled controller"),
-    (lambda: linear_loop().with_inputs(None), UnsupportedError, "sampled controller"),
-    (lambda: sw.charts.bode(linear_loop(), ["rk4"], dt=0.1), UnsupportedError, "sampled controller"),
-    (lambda: sw.equilibria(loop(gain=1.0), near=(0.0, 0.0)), UnsupportedError, "sampled controller"),
-    (lambda: sw.explain(loop(), "rk4"), UnsupportedError, "sampled controller"),
-    (lambda: run_of(mass().surrounded(bad_count(period=0.1))), TraceError, "expected u of one number, got shape"),
-    (lambda: run_of(mass().surrounded(bad_shape(period=0.1))), TraceError, "expected u of one number"),
-    (lambda: run_of(mass().surrounded(bad_branch(period=0.1))), TraceError, "bad_branch .*if"),
-    (lambda: run_of(mass().surrounded(bad_random(period=0.1))), TraceError, "the same operations at every call"),
+    (lambda: run_around(lambda t, v, y: (y, v)), TraceError, "expected u of one number, got shape"),
+    (lambda: run_around(lambda t, v, y: np.array([y, y])), TraceError, "expected u of one number"),
+    (lambda: run_around(lambda t, v, y: 1.0 if y > 0.0 else 0.0), TraceError, "<lambda> .*if"),
+    (lambda: run_around(lambda t, v, y: y + np.random.default_rng().uniform()), TraceError, "the same operations at every call"),
+]
+
+#: What takes no system with such a controller.
+READING: list[Any] = [
+    lambda: sw.stability_limit(loop(), "rk4"),
+    lambda: sw.analyse(loop(), "rk4", dt=0.01),
+    lambda: sw.jacobian(loop(), v=0.0, y=0.0),
+    lambda: sw.lyapunov(loop(), "rk4", v=0.0, y=0.0, dt=0.01, steps=10),
+    lambda: sw.discretise(linear_loop(), 0.1),
+    lambda: sw.sampled_loop(linear_loop(), 0.8, 0.1),
+    lambda: sw.LinearSystem.of(linear_loop()),
+    lambda: sw.frequency_response(linear_loop(), 1.0),
+    lambda: sw.margins(linear_loop()),
+    lambda: 2.0 * linear_loop(),
+    lambda: linear_loop() * linear_loop(),
+    lambda: linear_loop().with_inputs(None),
+    lambda: sw.charts.bode(linear_loop(), ["rk4"], dt=0.1),
+    lambda: sw.equilibria(loop(gain=1.0), near=(0.0, 0.0)),
+    lambda: sw.explain(loop(), "rk4"),
 ]
 
 
-@sw.controller
-def named_alike(t: Any, v: Any, y: Any, *, u: Any = 1.0) -> Any:
-    return u * y
-
-
-@sw.controller
-def bad_count(t: Any, v: Any, y: Any) -> Any:
-    return y, v
-
-
-@sw.controller
-def bad_shape(t: Any, v: Any, y: Any) -> Any:
-    return np.array([y, y])
-
-
-@sw.controller
-def bad_branch(t: Any, v: Any, y: Any) -> Any:
-    return 1.0 if y > 0.0 else 0.0
-
-
-@sw.controller
-def bad_random(t: Any, v: Any, y: Any) -> Any:
-    return y + np.random.default_rng().uniform()
-
-
-@looped("call, error, words", WRONG)
-def test_what_is_wrong_is_refused_before_any_work(call: Any, error: type[StepwellError], words: str) -> None:
-    with pytest.raises(error, match=words):
-        call()
+def test_what_is_wrong_is_refused_before_any_work() -> None:
+    assert_raises(*WRONG)
+    assert_raises(*((call, "sampled controller") for call in READING), kind=UnsupportedError)

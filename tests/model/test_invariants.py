@@ -4,18 +4,17 @@ from __future__ import annotations
 
 import copy
 import pickle
+from functools import partial
 from typing import Any
 
 import numpy as np
 import pytest
 import stepwell as sw
-from stepwell import _core
 from stepwell.errors import ArgumentError, UnknownNameError, UnsupportedError
-from stepwell.reference.traced import Tracer
-from stepwell.runs import engine
 from support import own_systems as own
+from support.calls import a_step, assert_raises
 from support.for_each import for_each
-from support.graphs import assert_one_graph
+from support.graphs import assert_traced_alike
 
 START: dict[str, Any] = {"v": np.array([0.0, 0.5]), "y": np.array([1.0, -2.0]), "dt": 0.05, "steps": 40, "every": 5}
 QUATERNION = {"v": np.array([1.0, 0.1, 0.2]), "y": np.array([1.0, 0.0, 0.0, 0.0]), "dt": 0.05, "steps": 40, "every": 5}
@@ -35,11 +34,8 @@ def test_an_invariant_is_recorded() -> None:
 @for_each("method", ["standard_euler", "standard_heun", "rk4", "false_euler", "dop853", "taylor"])
 @for_each("control", [sw.Control("energy", 2.0), sw.Control("energy", 2.0, "printed"), sw.Projection("energy")])
 def test_the_core_and_the_reference_are_one_graph_under_control(method: str, control: Any) -> None:
-    system = own.pendulum(omega=np.array([0.8, 1.3]))
-    controlled = system.for_state_shapes(START["v"], START["y"]).controlled(control, START["v"], START["y"], 0.05)
-    plan = engine.Plan(controlled, sw.method(method), controlled.batch, 0.05)
-    tape = _core.Tape()
-    assert_one_graph(tape, tape.trace(engine.model(plan), "step"), Tracer(controlled, tape).step(sw.method(method)))
+    system = own.pendulum(omega=np.array([0.8, 1.3])).for_state_shapes(START["v"], START["y"])
+    assert_traced_alike(system.controlled(control, START["v"], START["y"], 0.05), method)
 
 
 @for_each("form", ["printed", "limited"])
@@ -110,23 +106,15 @@ def test_where_the_gradient_is_zero_nothing_is_pushed() -> None:
 
 
 def test_what_resumes_a_run_has_its_control() -> None:
+    """A world, too; runs that go on are in test_ways.py."""
     system, control = own.pendulum(), sw.Control("energy", 2.0)
     whole = sw.integrate(system, "rk4", **START, control=control)
-    half = sw.integrate(system, "rk4", **START | {"steps": 20}, control=control)
-    for each in (system, half.system):
-        again = sw.integrate(each, "rk4", resume=half, steps=20)
-        np.testing.assert_array_equal(again.y[-1], whole.y[-1])
-        assert again.system.uncontrolled == half.system.uncontrolled
     world = sw.World(system, "rk4", v=START["v"].copy(), y=START["y"].copy(), dt=0.05, control=control)
     world.step(20)
     resumed = sw.World(system, "rk4", dt=0.05, resume=world)
     resumed.step(20)
     np.testing.assert_array_equal(resumed.y, whole.y[-1])
-    for each in (pickle.loads(pickle.dumps(whole.system)), copy.deepcopy(whole.system)):
-        assert each == whole.system
-    projected = sw.integrate(system, "rk4", **START, control=sw.Projection("energy"))
-    assert projected.work is not None
-    sw.integrate(projected.system, "rk4", resume=projected, steps=5)
+    assert pickle.loads(pickle.dumps(whole.system)) == copy.deepcopy(whole.system) == whole.system
 
 
 def test_batches_of_gains_and_targets() -> None:
@@ -138,84 +126,62 @@ def test_batches_of_gains_and_targets() -> None:
 
 
 def test_what_cannot_be() -> None:
-    arguments: dict[str, Any] = {"v": 0.0, "y": 1.0, "dt": 0.1, "steps": 1}
-    with pytest.raises(UnknownNameError, match=r"control: there is no 'enrgy'; did you mean 'energy'"):
-        sw.integrate(own.pendulum(), "rk4", **arguments, control=sw.Control("enrgy", 1.0))
-    with pytest.raises(UnsupportedError, match=r"EnergyControl .* use Control\('energy', gain\)"):
-        sw.integrate(own.pendulum(), "rk4", **arguments, control=sw.EnergyControl(1.0))
-    with pytest.raises(UnsupportedError, match=r"Projection\('scaling'\) .* use Projection\('energy'\)"):
-        sw.integrate(own.pendulum(), "rk4", **arguments, control=sw.Projection())
-    with pytest.raises(UnsupportedError, match=r"is for an invariant of an own system"):
-        sw.integrate(sw.NBody(), "rk4", **arguments | {"y": np.eye(3, 2)}, control=sw.Control("energy", 1.0))
-    with pytest.raises(UnsupportedError, match=r"energy: duffing.* declare one: @duffing.invariant"):
-        sw.integrate(own.duffing(), "rk4", **arguments, record="energy")
-    with pytest.raises(UnsupportedError, match=r"verlet needs"):
-        sw.integrate(own.pendulum(), "verlet", **arguments, control=sw.Control("energy", 1.0))
-
     @sw.system
     def plain(t: Any, v: Any, y: Any, *, k: Any = 1.0) -> Any:
         return -k * y
 
-    with pytest.raises(ArgumentError, match=r"plain: wrong: expected .* \(t, v, y, \*, …\) whose .* got 'm'. Known: k"):
+    def declared(name: str, arguments: str) -> Any:
+        namespace: dict[str, Any] = {}
+        exec(f"def {name}({arguments}):\n    return [y, y]", namespace)
+        return plain.invariant(namespace[name])
 
-        @plain.invariant
-        def wrong(v: Any, y: Any, *, m: Any) -> Any:
-            return m * v
-
-    with pytest.raises(ArgumentError, match=r"plain: short: expected a function \(v, y, \*, …\)"):
-
-        @plain.invariant
-        def short(y: Any) -> Any:
-            return y
-
-    @plain.invariant
-    def vector(v: Any, y: Any) -> Any:
-        return np.array([v, y])
-
-    with pytest.raises(ArgumentError, match=r"plain: vector: expected one number of a state, got an array of shape \(2,\)"):
-        sw.integrate(plain(), "rk4", **arguments, record="vector")
+    gain = sw.Control("energy", 1.0)
+    declared("vector", "v, y")
+    run = partial(a_step, own.pendulum)
+    assert_raises(
+        (lambda: run(control=sw.Control("enrgy", 1.0)), UnknownNameError, "control: there is no 'enrgy'; did you mean 'energy'"),
+        (lambda: run(control=sw.EnergyControl(1.0)), UnsupportedError, r"EnergyControl .* use Control\('energy', gain\)"),
+        (lambda: run(control=sw.Projection()), UnsupportedError, r"Projection\('scaling'\) .* use Projection\('energy'\)"),
+        (lambda: run("verlet", control=gain), UnsupportedError, "verlet needs"),
+        (lambda: a_step(sw.NBody(), y=np.eye(3, 2), control=gain), UnsupportedError, "is for an invariant of an own system"),
+        (lambda: a_step(own.duffing, record="energy"), UnsupportedError, "energy: duffing.* declare one: @duffing.invariant"),
+        (lambda: declared("wrong", "v, y, *, m"), ArgumentError, r"plain: wrong: expected .* whose .* got 'm'. Known: k"),
+        (lambda: declared("short", "y"), ArgumentError, r"plain: short: expected a function \(v, y, \*, …\)"),
+        (lambda: a_step(plain, record="vector"), ArgumentError, r"plain: vector: expected one number .* of shape \(2,\)"),
+    )
 
 
 def test_an_invariant_may_take_the_time_before_the_state() -> None:
     """As rates do; but no quantity that depends on it is constant."""
-    for order in (1, 2):
-        rates: Any = (lambda t, y, *, k=2.0: np.array([-k * y[1], y[0]])) if order == 1 else (lambda t, v, y, *, k=2.0: -k * y)
-        kind = sw.system(order=order)(rates)
-        if order == 1:
+    first = sw.system(order=1)(lambda t, y, *, k=2.0: np.array([-k * y[1], y[0]]))
+    second = sw.system(lambda t, v, y, *, k=2.0: -k * y)
 
-            @kind.invariant
-            def energy(t: Any, y: Any, *, k: Any) -> Any:
-                return 0.5 * y[0] ** 2 + 0.5 * k * y[1] ** 2
+    def of_first(t: Any, y: Any, *, k: Any) -> Any:
+        return 0.5 * y[0] ** 2 + 0.5 * k * y[1] ** 2
 
-            @kind.invariant
-            def plain(y: Any, k: Any) -> Any:
-                return 0.5 * y[0] ** 2 + 0.5 * k * y[1] ** 2
-        else:
+    def of_second(t: Any, v: Any, y: Any, k: Any) -> Any:
+        return 0.5 * v**2 + 0.5 * k * y**2
 
-            @kind.invariant
-            def energy(t: Any, v: Any, y: Any, k: Any) -> Any:
-                return 0.5 * v**2 + 0.5 * k * y**2
-
-            @kind.invariant
-            def plain(v: Any, y: Any, *, k: Any) -> Any:
-                return 0.5 * v**2 + 0.5 * k * y**2
-
-        start: dict[str, Any] = {"y": np.ones(2)} if order == 1 else {"v": 0.0, "y": 1.0}
-        run = sw.integrate(kind(k=3.0), "rk4", **start, dt=0.1, steps=5, every=1, record=["energy", "plain"])
-        np.testing.assert_array_equal(run.recorded["energy"], run.recorded["plain"])
-        projected = sw.integrate(kind(k=3.0), "rk4", **start, dt=0.1, steps=5, control=sw.Projection("energy"))
-        assert projected.energy[-1] == pytest.approx(run.energy[0], rel=1e-9)  # one correction of an error of 1e-6, squared
-        assert sw.integrate(kind(k=3.0), "rk4", **start, dt=0.1, steps=5, record="energy")
-
-    @sw.system
-    def driven(t: Any, v: Any, y: Any) -> Any:
-        return np.cos(t) - y
+    systems: list[tuple[Any, Any, dict[str, Any]]] = [
+        (first, of_first, {"y": np.ones(2)}),
+        (second, of_second, {"v": 0.0, "y": 1.0}),
+    ]
+    for system, function, start in systems:
+        name = function.__name__
+        system.invariant(function)
+        options: dict[str, Any] = {**start, "dt": 0.1, "steps": 5, "record": name}
+        run, onto = (sw.integrate(system(k=3.0), "rk4", **options, control=each) for each in (None, sw.Projection(name)))
+        states = [run.y[-1]] if system is first else [run.v[-1], run.y[-1]]
+        assert run.recorded[name][-1] == pytest.approx(function(0.0, *states, k=3.0), rel=1e-15)
+        # One correction of an error of 1e-6, squared.
+        assert onto.recorded[name][-1] == pytest.approx(function(0.0, *start.values(), k=3.0), rel=1e-9)
+    driven = sw.system(lambda t, v, y: np.cos(t) - y)
 
     @driven.invariant
     def moving(t: Any, v: Any, y: Any) -> Any:
         return v - np.sin(t)
 
-    with pytest.raises(ArgumentError, match=r"driven: moving: .* one that depends on the time t"):
+    with pytest.raises(ArgumentError, match=r"moving: .* one that depends on the time t"):
         sw.integrate(driven, "rk4", v=0.0, y=1.0, dt=0.1, steps=1, record="moving")
 
 
@@ -236,11 +202,8 @@ def test_adaptive_steps_of_a_system_under_control() -> None:
         pairs.append((mine, own.pendulum(), 1.0, mine.keeper))
     for controlled, free, start, control in pairs:
         ask: dict[str, Any] = {"v": 0.0, "y": start, "tolerance": 1e-3, "at": [0.5]}
-        run, anew, alone = (
-            sw.integrate(controlled, "dop853", **ask),
-            sw.integrate(free, "dop853", **ask, control=control),
-            sw.integrate(free, "dop853", **ask),
-        )
+        run, alone = (sw.integrate(system, "dop853", **ask) for system in (controlled, free))
+        anew = sw.integrate(free, "dop853", **ask, control=control)
         np.testing.assert_array_equal(run.y, anew.y)
         assert run.system.keeper is not None
         assert not np.array_equal(run.y, alone.y)

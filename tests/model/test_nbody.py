@@ -67,14 +67,10 @@ def test_angular_momentum_is_kept_by_symplectic_methods(seed: int, n: int, dim: 
     run = sw.integrate(system, method, v=v, y=y, dt=0.01, steps=200)
     before, after = spin(system.masses, v, y), spin(system.masses, run.v[-1], run.y[-1])
     reach = np.abs(y).max() + 2.0 * np.abs(run.v[-1]).max() + np.abs(run.y[-1]).max()
-    np.testing.assert_allclose(after, before, rtol=0, atol=200 * 40 * EPS * n * n * reach * (1.0 + np.abs(v).max()))
-
-
-def test_angular_momentum_is_not_kept_by_standard_euler() -> None:
-    """So the test above can fail."""
-    system, v, y = bodies(3, 3, 2, "newton")
-    run = sw.integrate(system, "standard_euler", v=v, y=y, dt=0.01, steps=200)
-    assert np.abs(spin(system.masses, run.v[-1], run.y[-1]) - spin(system.masses, v, y)).max() > 1e-3
+    bound = 200 * 40 * EPS * n * n * reach * (1.0 + np.abs(v).max())
+    np.testing.assert_allclose(after, before, rtol=0, atol=bound)
+    euler = sw.integrate(system, "standard_euler", v=v, y=y, dt=0.01, steps=200)  # which does not keep it
+    assert n == 1 or np.abs(spin(system.masses, euler.v[-1], euler.y[-1]) - before).max() > bound
 
 
 @settings(max_examples=40, deadline=None)
@@ -201,17 +197,6 @@ def test_threads_share_the_distances_of_one_system(n: int, control: sw.EnergyCon
         world = sw.World(system, "false_euler", v=v.copy(), y=y.copy(), dt=0.01)
         world.step(2)
         np.testing.assert_array_equal(world.y, reference.y[-1])
-
-
-@pytest.mark.parametrize("n", family([40, 65, 513], lambda n: n == 65))
-def test_several_large_systems_equal_the_reference(n: int) -> None:
-    rng = np.random.default_rng(n)
-    system = sw.NBody(rng.uniform(0.5, 2.0, n) / n, force="newton", softening=0.1)
-    v, y = rng.normal(size=(2, n, 2, 9))
-    for control in (None, sw.EnergyControl(0.7, "limited", target=0.1)):
-        arguments: dict[str, Any] = {"v": v, "y": y, "dt": 0.01, "steps": 2, "control": control}
-        runs = [sw.integrate(system, "false_euler", **arguments, backend=name) for name in ("rust", "numpy")]
-        assert_same(*runs)
 
 
 def test_every_pair_meets_once() -> None:

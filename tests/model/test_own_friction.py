@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pickle
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,7 @@ from stepwell.errors import ArgumentError, DTypeError, StepwellError, TraceError
 from stepwell.reference import friction
 from stepwell.reference.systems import equations
 from support import own_systems as own
+from support.calls import a_step, assert_raises
 from support.looped import looped
 from support.mistakes import mistaken
 
@@ -31,15 +33,9 @@ def sliding(t: Any, v: Any, y: Any, *, slope: Any, mu: Any) -> Any:
     return mu * G * np.cos(slope)
 
 
-@sw.system(shape=(2,))
-def puck(t: Any, v: Any, y: Any, *, mu: Any = 0.5) -> Any:
-    """On a table."""
-    return np.zeros(2)
-
-
-@puck.friction(of="row")
-def table(t: Any, v: Any, y: Any, *, mu: Any) -> Any:
-    return mu * G
+#: On a table.
+puck = sw.system(shape=(2,))(lambda t, v, y, *, mu=0.5: np.zeros(2))
+puck.friction(of="row")(lambda t, v, y, *, mu: mu * G)
 
 
 @sw.system
@@ -59,18 +55,9 @@ def bead_while_it_rises(t: Any, v: Any, y: Any, *, mu: Any = 0.3, g: Any = 1.0) 
     return -g * np.sin(y) - mu * np.abs(v * v + g * np.cos(y))
 
 
-@sw.system
-def lifted(t: Any, v: Any, y: Any) -> Any:
-    """Nothing pushes it."""
-    return np.zeros(())
-
-
-@lifted.friction
-def of_no_weight(t: Any, v: Any, y: Any) -> Any:
-    return -1.0
-
-
-# ---- closed forms
+#: Nothing pushes it.
+lifted = sw.system(lambda t, v, y: np.zeros(()))
+lifted.friction(lambda t, v, y: -1.0)
 
 
 @looped("method", ["false_euler", "standard_euler"])
@@ -122,9 +109,6 @@ def test_a_negative_deceleration_is_none() -> None:
     np.testing.assert_array_equal(run.v[-1], [1.0, -1.0, 0.0])
 
 
-# ---- one number, with which others change
-
-
 def test_a_pole_swings_on_a_cart_that_sticks() -> None:
     """θ̈ = (g/l)·sin θ of a hinge that rests; the terms of the cart cancel but for roundings."""
     run = sw.integrate(own.cart(mu=50.0), "rk4", v=[0.0, 0.0], y=[0.5, 0.3], dt=0.01, steps=300, every=1)
@@ -151,19 +135,11 @@ def test_without_friction_a_cart_and_its_pole_go_on() -> None:
 
 
 def test_a_number_alone_changes_no_other() -> None:
-    @sw.system
-    def two(t: Any, v: Any, y: Any) -> Any:
-        return -y
-
-    @two.friction(component=1)
-    def second(t: Any, v: Any, y: Any) -> Any:
-        return 0.4
-
+    two = sw.system(lambda t, v, y: -y)
+    two.friction(component=1)(lambda t, v, y: 0.4)
     run = sw.integrate(two(), "rk4", v=[0.0, 0.0], y=[1.0, 1.0], dt=0.01, steps=2000, every=1)
-    built_in = [
-        sw.integrate(sw.Oscillator(1.0, friction=mu), "rk4", v=0.0, y=1.0, dt=0.01, steps=2000, every=1) for mu in (0.0, 0.4)
-    ]
-    np.testing.assert_allclose(run.y, np.stack([each.y for each in built_in], axis=1), rtol=0, atol=1e-11)
+    built_in = sw.integrate(sw.Oscillator(1.0, friction=[0.0, 0.4]), "rk4", v=0.0, y=1.0, dt=0.01, steps=2000, every=1)
+    np.testing.assert_allclose(run.y, built_in.y, rtol=0, atol=1e-11)
     assert (run.v[-1] != 0.0).tolist() == [True, False]
 
 
@@ -187,32 +163,9 @@ def test_a_sweep_over_the_coefficient() -> None:
     np.testing.assert_allclose(rows["y_last"], 4.5 / G / np.array([0.2, 0.5, 1.0]), rtol=2e-3)
 
 
-def test_it_is_pickled_and_has_its_own_digest() -> None:
-    again = pickle.loads(pickle.dumps(own.cart(mu=0.1)))
-    options: dict[str, Any] = {"v": [0.0, 0.0], "y": [0.0, 0.3], "dt": 0.01, "steps": 50}
-    np.testing.assert_array_equal(sw.integrate(again, "rk4", **options).y, sw.integrate(own.cart(mu=0.1), "rk4", **options).y)
-
-    @sw.system
-    def plain(t: Any, v: Any, y: Any, *, slope: Any = 0.0, mu: Any = 0.5) -> Any:
-        return -G * np.sin(slope)
-
-    assert plain().digest != block().digest
-
-
-@looped("one, shape", [(own.sloping(mu=0.1), ()), (own.pucks(mu=0.1), (3, 2)), (own.cart(mu=0.1), (2,))])
-def test_an_exported_step_has_its_bits(one: Any, shape: tuple[int, ...]) -> None:
-    v, y = np.random.default_rng(7).normal(size=(2, *shape))
-    space: dict[str, Any] = {}
-    exec(sw.export(one, "rk4", "python", v=v, y=y, dt=0.05, name="one").source, space)
-    m = space["One"]()
-    s = m.start(v.ravel().tolist(), y.ravel().tolist())
-    for _ in range(60):
-        m.step(s)
-    run = sw.integrate(one, "rk4", v=v, y=y, dt=0.05, steps=60)
-    assert (s.y, s.v) == (run.y[-1].ravel().tolist(), run.v[-1].ravel().tolist())
-
-
-# ---- what is wrong would be noticed
+def test_it_has_its_own_digest() -> None:
+    plain = sw.system(lambda t, v, y, *, slope=0.0, mu=0.5: -G * np.sin(slope))
+    assert plain().digest != block().digest == pickle.loads(pickle.dumps(block())).digest
 
 
 @pytest.mark.mutant
@@ -253,9 +206,6 @@ def test_a_pole_left_behind_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
     assert off() > 1e-3
 
 
-# ---- refusals
-
-
 @sw.system
 def pair(t: Any, v: Any, y: Any, *, k: Any = 1.0) -> Any:
     return -k * y
@@ -279,32 +229,23 @@ def fresh(**options: Any) -> Any:
     return bare.friction(**options) if options else bare.friction
 
 
-def rate() -> Any:
-    @sw.system(order=1)
-    def decay(t: Any, y: Any) -> Any:
-        return -y
-
-    return decay
-
-
 def declared(function: Callable[..., Any], v: Any = (0.0, 0.0), **options: Any) -> Callable[[], Any]:
     def call() -> Any:
-        @sw.system(shape=np.shape(v))
-        def bare(t: Any, v: Any, y: Any, *, k: Any = 1.0) -> Any:
-            return -k * y
-
+        bare = sw.system(shape=np.shape(v))(lambda t, v, y, *, k=1.0: -k * y)
         bare.friction(**options)(function)
         return sw.integrate(bare(), "rk4", v=v, y=v, dt=0.1, steps=1)
 
     return call
 
 
+def of_pair(*arguments: Any, **options: Any) -> Callable[[], Any]:
+    return partial(a_step, pair, *arguments, **options)
+
+
+DEPENDS = "has friction that sticks; what it does depends on the step"
+TAKES = "from which friction takes energy for good"
 REFUSALS: list[tuple[Callable[[], Any], type[StepwellError], str]] = [
-    (
-        lambda: rate().friction(lambda t, v, y: 1.0),
-        ArgumentError,
-        "decay: friction acts on velocities, and a system of first order has none",
-    ),
+    (lambda: sw.system(order=1)(lambda t, y: -y).friction(sliding), ArgumentError, "friction acts on velocities, .* has none"),
     (lambda: pair.friction(rubbing), ArgumentError, "pair: expected one function for friction, and rubbing is declared"),
     (lambda: fresh()(3), DTypeError, "bare: expected a function as friction, got int"),
     (lambda: fresh()(lambda v, y: 1.0), ArgumentError, r"expected a function \(t, v, y, \*, …\), got \(v, y\)"),
@@ -313,43 +254,17 @@ REFUSALS: list[tuple[Callable[[], Any], type[StepwellError], str]] = [
     (lambda: fresh(of="row", component=0), ArgumentError, "component: one number of v is no row"),
     (declared(lambda t, v, y: 1.0, component=2), TraceError, r"component=2 is no number of a v of shape \(2,\)"),
     (declared(lambda t, v, y: 1.0, v=0.0, of="row"), TraceError, 'of="row" needs vectors along the last axis of v'),
-    (
-        declared(lambda t, v, y: np.ones(3)),
-        TraceError,
-        r"expected a deceleration of shape \(2,\), or one number, got shape \(3,\)",
-    ),
+    (declared(lambda t, v, y: np.ones(3)), TraceError, r"deceleration of shape \(2,\), or one number, got shape \(3,\)"),
     (declared(lambda t, v, y: (1.0, 2.0, 3.0), component=0), TraceError, "expected a deceleration, or a pair"),
     (declared(lambda t, v, y: None), TraceError, r"expected a deceleration of shape \(2,\), got nothing"),
-    (
-        lambda: sw.integrate(pair(), "merson", v=0.0, y=1.0, tolerance=1e-3, at=[1.0]),
-        UnsupportedError,
-        "tolerance: .* has friction that sticks; what it does depends on the step",
-    ),
-    (
-        lambda: sw.integrate(pair(), "rk4", v=0.0, y=1.0, dt=0.1, steps=1, control=sw.Control("energy", 1.0)),
-        UnsupportedError,
-        "control: .* keeps an invariant of .*, from which friction takes energy for good; leave one out",
-    ),
-    (
-        lambda: sw.integrate(pair(), "rk4", v=0.0, y=1.0, dt=0.1, steps=1, control=sw.Projection("energy")),
-        UnsupportedError,
-        "from which friction takes energy for good",
-    ),
     (lambda: sw.jacobian(pair(), v=0.0, y=1.0), UnsupportedError, "rates: .* has friction that sticks"),
-    (
-        lambda: sw.integrate(pair(), "rk4", v=0.0, y=1.0, dt=-0.1, steps=1),
-        UnsupportedError,
-        "dt: a negative step needs a unique past",
-    ),
-    (
-        lambda: sw.integrate(pair(), "leapfrog", v=0.0, y=1.0, dt=0.1, steps=1),
-        UnsupportedError,
-        "leapfrog needs forces that do not depend on the velocity, but .* has friction; use false_euler, or leave friction out",
-    ),
+    (of_pair("merson", dt=None, steps=None, tolerance=1e-3, at=[1.0]), UnsupportedError, f"tolerance: .* {DEPENDS}"),
+    (of_pair(control=sw.Control("energy", 1.0)), UnsupportedError, f"control: .* an invariant of .*, {TAKES}; leave one out"),
+    (of_pair(control=sw.Projection("energy")), UnsupportedError, TAKES),
+    (of_pair(dt=-0.1), UnsupportedError, "dt: a negative step needs a unique past"),
+    (of_pair("leapfrog"), UnsupportedError, "leapfrog needs .*, but .* has friction; use false_euler, or leave friction out"),
 ]
 
 
-@looped("call, kind, text", REFUSALS)
-def test_what_does_not_go_is_refused(call: Callable[[], Any], kind: type[StepwellError], text: str) -> None:
-    with pytest.raises(kind, match=text):
-        call()
+def test_what_does_not_go_is_refused() -> None:
+    assert_raises(*REFUSALS)

@@ -15,6 +15,7 @@ import pytest
 import stepwell as sw
 from stepwell.errors import ArgumentError, DTypeError, ShapeError, StepwellError, UnsupportedError
 from support.abroad import Journey, run
+from support.calls import assert_raises
 from support.export import assert_same as assert_same_bits
 from support.export import languages
 from support.looped import looped
@@ -22,7 +23,6 @@ from support.own_methods import a_step_back, adams_bashforth_2, adams_bashforth_
 from support.ways import assert_equal_ways
 
 RNG = np.random.default_rng(20)
-
 
 ALL = [halfway, heun_euler, adams_bashforth_2, adams_bashforth_3]
 KEEPING = ALL[2:]
@@ -33,9 +33,7 @@ def duffing(t: Any, v: Any, y: Any, *, beta: Any = 1.0) -> Any:
     return 0.5 * np.cos(1.2 * t) - 0.3 * v + y - beta * y**3
 
 
-@sw.system
-def falling(t: Any, v: Any, y: Any) -> Any:
-    return -1.0 + 0.0 * y
+falling = sw.system(lambda t, v, y: -1.0 + 0.0 * y)
 
 
 @sw.system(order=1)
@@ -44,41 +42,13 @@ def decay(t: Any, y: Any, *, rate: Any = 1.0) -> Any:
 
 
 def bodies(n: int) -> tuple[sw.System, Any, Any]:
-    return (
-        sw.NBody(RNG.uniform(0.2, 1.0, n), force="newton", softening=0.1),
-        0.4 * RNG.normal(size=(n, 3)),
-        RNG.normal(size=(n, 3)),
-    )
+    masses = RNG.uniform(0.2, 1.0, n)
+    return sw.NBody(masses, force="newton", softening=0.1), 0.4 * RNG.normal(size=(n, 3)), RNG.normal(size=(n, 3))
 
 
-def points(count: int, floor: sw.Floor) -> tuple[sw.System, Any, Any]:
-    masses = np.linspace(0.5, 2.0, count)
-    return (
-        sw.Particles(masses, gravity=9.81, floor=floor, dim=2),
-        RNG.normal(size=(count, 2)),
-        np.abs(RNG.normal(size=(count, 2))) + 0.05,
-    )
-
-
-#: Systems whose whole step is a tape, and large ones, which are stepped row by row; with their steps.
-SYSTEMS: dict[str, Callable[[], tuple[Any, Any, Any, float]]] = {
-    "own": lambda: (duffing(beta=np.linspace(0.5, 2.0, 19)), 0.0, 1.0, 0.02),
-    "first order": lambda: (decay(rate=np.linspace(0.5, 2.0, 5)), np.zeros((0, 5)), 1.0, 0.05),
-    "driven": lambda: (sw.Oscillator(1.0, a=sw.Sampled(RNG.normal(size=40), 0.1)), 0.2, 1.0, 0.04),
-    "driven, linear": lambda: (
-        sw.Oscillator(1.0, 0.1, a=sw.Sampled(RNG.normal(size=40), 0.1, interpolation="linear")),
-        0.2,
-        1.0,
-        0.04,
-    ),
-    "rigid body": lambda: (sw.RigidBody([1.0, 1.4, 2.0]), np.array([0.7, 1.0, -0.4]), np.array([0.5, 0.1, -0.7, 0.5]), 0.02),
-    "few bodies": lambda: (*bodies(3), 0.01),
-    "many bodies": lambda: (*bodies(90), 0.001),
-    "long chain": lambda: (sw.Chain(400), np.ones(400), np.linspace(0.0, 1.0, 400), 0.02),
-    "large matrix": lambda: (sw.LinearSystem(RNG.normal(size=(80, 80)) / 10.0), np.ones(40), np.ones(40), 0.02),
-    "points on a floor": lambda: (*points(3, sw.Floor(restitution=0.6, friction=0.3)), 0.02),
-    "many points on a floor": lambda: (*points(500, sw.Floor(restitution=0.6)), 0.03),
-}
+def points(count: int, **floor: float) -> tuple[sw.System, Any, Any]:
+    system = sw.Particles(np.linspace(0.5, 2.0, count), gravity=9.81, floor=sw.Floor(**floor), dim=2)
+    return system, RNG.normal(size=(count, 2)), np.abs(RNG.normal(size=(count, 2))) + 0.05
 
 
 def test_the_record_follows_from_the_operations() -> None:
@@ -126,25 +96,27 @@ def test_a_built_in_method_written_again_has_its_bits(name: str) -> None:
         assert np.array_equal(one.y, other.y)
 
 
-@looped(
-    "name, methods, options",
-    [
-        ("own", [heun_euler], {"dtype": "float32"}),
-        ("first order", [adams_bashforth_3], {"fused": True}),
-        ("driven", [halfway, adams_bashforth_3], {}),
-        ("driven, linear", [heun_euler, adams_bashforth_2], {}),
-        ("rigid body", [adams_bashforth_3], {"dtype": "float32"}),
-        ("few bodies", [heun_euler, adams_bashforth_3], {"fused": True}),
-        ("many bodies", [halfway, adams_bashforth_3], {}),
-        ("long chain", [heun_euler, adams_bashforth_2], {}),
-        ("large matrix", [halfway, adams_bashforth_2], {}),
-        ("points on a floor", [halfway, adams_bashforth_3], {}),
-        ("many points on a floor", ALL, {}),
-    ],
-)
-def test_core_and_reference_have_the_same_bits(name: str, methods: list[sw.Method], options: dict[str, Any]) -> None:
+#: Steps that are one tape, of which test_ways.py has more, and steps row by row: the system, v, y, dt, methods and options.
+STEPPED: list[tuple[Callable[[], tuple[Any, Any, Any, float]], list[sw.Method], dict[str, Any]]] = [
+    (lambda: (duffing(beta=np.linspace(0.5, 2.0, 19)), 0.0, 1.0, 0.02), [heun_euler, adams_bashforth_3], {"dtype": "float32"}),
+    (lambda: (decay(rate=np.linspace(0.5, 2.0, 5)), np.zeros((0, 5)), 1.0, 0.05), [adams_bashforth_3], {"fused": True}),
+    (lambda: (*bodies(3), 0.01), [heun_euler, adams_bashforth_3], {"fused": True}),
+    (lambda: (*bodies(90), 0.001), [halfway, adams_bashforth_3], {}),
+    (lambda: (sw.Chain(400), np.ones(400), np.linspace(0.0, 1.0, 400), 0.02), [heun_euler, adams_bashforth_2], {}),
+    (
+        lambda: (sw.LinearSystem(RNG.normal(size=(80, 80)) / 10.0), np.ones(40), np.ones(40), 0.02),
+        [halfway, adams_bashforth_2],
+        {},
+    ),
+    (lambda: (*points(3, restitution=0.6, friction=0.3), 0.02), [halfway, adams_bashforth_3], {}),
+    (lambda: (*points(500, restitution=0.6), 0.03), ALL, {}),
+]
+
+
+@looped("make, methods, options", STEPPED)
+def test_core_and_reference_have_the_same_bits(make: Any, methods: list[sw.Method], options: dict[str, Any]) -> None:
     """What is kept goes along: from run to run, into a world, its copy, and back."""
-    system, v, y, dt = SYSTEMS[name]()
+    system, v, y, dt = make()
     for method in methods:
         start: dict[str, Any] = {"v": v, "y": y, "dt": dt, **options}
         whole, reference = (sw.integrate(system, method, **start, steps=24, backend=each) for each in ("rust", "numpy"))
@@ -162,21 +134,18 @@ def test_core_and_reference_have_the_same_bits(name: str, methods: list[sw.Metho
             assert np.array_equal(each.y, whole.y[-1])
 
 
-def test_a_run_that_begins_anew_has_another_first_step() -> None:
+def test_what_begins_anew_has_another_first_step() -> None:
+    """A run from where another ended, and a world whose state was changed."""
     for method in KEEPING:
         whole, part = (sw.integrate(duffing(), method, v=0.0, y=1.0, dt=0.02, steps=steps) for steps in (30, 13))
         anew = sw.integrate(duffing(), method, v=part.v[-1], y=part.y[-1], dt=0.02, steps=17, start_step=13)
         assert not np.array_equal(anew.y[-1], whole.y[-1])
-
-
-def test_a_state_that_was_changed_begins_anew() -> None:
     v, y = np.zeros(3), np.ones(3)
     world = sw.World(sw.Pendulum(), adams_bashforth_2, v=v, y=y, dt=0.02)
     world.step(10)
     y[1] = 0.5
-    before = v.copy(), y.copy()
+    fresh = sw.integrate(sw.Pendulum(), adams_bashforth_2, v=v.copy(), y=y.copy(), dt=0.02, steps=10, start_step=10)
     world.step(10)
-    fresh = sw.integrate(sw.Pendulum(), adams_bashforth_2, v=before[0], y=before[1], dt=0.02, steps=10, start_step=10)
     assert np.array_equal(y, fresh.y[-1])
 
 
@@ -232,37 +201,31 @@ def test_events_are_located_and_change_the_state() -> None:
         assert np.abs(y - exact.y[-1]).max() < 1e-13
 
 
-@looped("control", [sw.EnergyControl(gain=0.3), sw.Projection()])
-def test_controls_act_between_steps(control: Any) -> None:
+def test_controls_act_between_steps() -> None:
+    """A strong one is told of, also where a run goes on: the velocities stand before what the method keeps."""
     scene = sw.scenes.clover()
-    options: dict[str, Any] = {"v": scene.v, "y": scene.y, "dt": 0.01, "steps": 200, "control": control}
+    start: dict[str, Any] = {"v": scene.v, "y": scene.y, "dt": 0.01}
+    strong = sw.EnergyControl(gain=1000.0, form="printed")
     for method in KEEPING:
-        runs = [sw.integrate(scene.system, method, **options | {"control": each}) for each in (None, control)]
-        energies = [scene.system.energy(run.v[-1], run.y[-1]) for run in runs]
-        assert abs(energies[1] - scene.system.energy(scene.v, scene.y)) < abs(energies[0] - scene.system.energy(scene.v, scene.y))
-
-
-def test_a_strong_control_is_told_of_where_a_run_goes_on() -> None:
-    """The velocities stand before what the method keeps."""
-    scene = sw.scenes.clover()
-    control = sw.EnergyControl(gain=1000.0, form="printed")
-    for method in KEEPING:
+        free, *controlled = (
+            sw.integrate(scene.system, method, **start, steps=200, control=each)
+            for each in (None, sw.EnergyControl(gain=0.3), sw.Projection())
+        )
+        begin = scene.system.energy(scene.v, scene.y)
+        for kept in controlled:
+            assert abs(kept.energy[-1] - begin) < abs(free.energy[-1] - begin)
         with pytest.warns(sw.ControlWarning, match="h·C·K"):
-            run = sw.integrate(scene.system, method, v=scene.v, y=scene.y, dt=0.01, steps=1, control=control)
+            first = sw.integrate(scene.system, method, **start, steps=1, control=strong)
         with pytest.warns(sw.ControlWarning, match="h·C·K"):
-            sw.integrate(scene.system, method, resume=run, steps=1)
+            sw.integrate(scene.system, method, resume=first, steps=1)
 
 
 def test_a_member_that_diverges_is_named_with_its_step() -> None:
-    steps = []
-    for backend in ("rust", "numpy"):
-        with pytest.warns(sw.DivergenceWarning):
-            run = sw.integrate(sw.Oscillator([1.0, 1e3]), adams_bashforth_2, v=0.0, y=1.0, dt=0.1, steps=400, backend=backend)
-        steps.append(run.first_bad_step.tolist())
+    options: dict[str, Any] = {"v": 0.0, "y": np.ones(2), "dt": 0.1, "steps": 400}
+    run = assert_equal_ways(sw.Oscillator([1.0, 1e3]), adams_bashforth_2, **options, ways=("by the reference",))
     # A step multiplies by some 1.5·10⁴/√2 at most: 308 digits take more than 70 steps.
-    assert steps[0] == steps[1]
-    assert steps[0][0] == -1
-    assert 70 < steps[0][1] < 200
+    assert run.first_bad_step[0] == -1
+    assert 70 < run.first_bad_step[1] < 200
 
 
 def test_methods_are_values() -> None:
@@ -304,21 +267,13 @@ def test_a_bounce_on_rods_is_refused_since_it_ends_what_is_kept() -> None:
         sw.integrate(rods, adams_bashforth_2, **options)
 
 
-def test_explanations_name_what_is_kept() -> None:
+def test_charts_and_explanations_take_them(tmp_path: Any) -> None:
     text = str(sw.explain(sw.Pendulum(), adams_bashforth_2))
     assert "v'   = v − 1.5·a10 − 0.5·dv1\n" in text
     assert "at the start of a run, dv1, dy1 from v and y" in text
-
-
-def test_charts_and_sweeps_take_them(tmp_path: Any) -> None:
     chart = sw.charts.work_precision(sw.scenes.oscillator(), [halfway, adams_bashforth_3, "rk4"], [40, 80])
     assert {"halfway", "adams_bashforth_3", "rk4"} <= {row["method"] for row in chart.rows()}
     chart.plot(tmp_path / "chart.png")
-    pytest.importorskip("xarray")
-    axes = {"beta": np.linspace(0.5, 2.0, 5)}
-    swept = sw.sweep(duffing, axes, adams_bashforth_2, v=0.0, y=1.0, dt=0.02, steps=50, outcomes="last")
-    run = sw.integrate(duffing(beta=np.linspace(0.5, 2.0, 5)), adams_bashforth_2, v=0.0, y=1.0, dt=0.02, steps=50)
-    assert np.array_equal(swept["y_last"].to_numpy().ravel(), run.y[-1])
 
 
 def exported(language: str) -> list[Journey]:
@@ -355,20 +310,17 @@ def test_every_bit_of_exported_steps(language: str, tmp_path: Any) -> None:
     assert_same_bits(every, run(language, every, tmp_path))
 
 
-@looped(
-    "what",
-    [
-        lambda m: sw.analyse(sw.Oscillator(), m, dt=0.1),
-        lambda m: sw.stability_limit(sw.Oscillator(), m),
-        lambda m: sw.lyapunov(sw.Pendulum(), m, v=0.0, y=1.0, dt=0.1, steps=100),
-        lambda m: sw.integrate(sw.Oscillator(), m, v=0.0, y=1.0, dt=0.1, steps=3, form="matrix"),
-        lambda m: sw.explain(sw.Oscillator(), m, form="matrix"),
-        lambda m: sw.stability.series(m),
-    ],
-)
-def test_what_needs_a_map_from_state_to_state_is_refused_in_words(what: Callable[[Any], Any]) -> None:
-    with pytest.raises(UnsupportedError, match=r"goes on from more than v and y: from dv1, dy1"):
-        what(adams_bashforth_2)
+def test_what_needs_a_map_from_state_to_state_is_refused_in_words() -> None:
+    one, m = sw.Oscillator(), adams_bashforth_2
+    calls: list[Callable[[], Any]] = [
+        lambda: sw.analyse(one, m, dt=0.1),
+        lambda: sw.stability_limit(one, m),
+        lambda: sw.lyapunov(sw.Pendulum(), m, v=0.0, y=1.0, dt=0.1, steps=100),
+        lambda: sw.integrate(one, m, v=0.0, y=1.0, dt=0.1, steps=3, form="matrix"),
+        lambda: sw.explain(one, m, form="matrix"),
+        lambda: sw.stability.series(m),
+    ]
+    assert_raises(*((call, "goes on from more than v and y: from dv1, dy1") for call in calls), kind=UnsupportedError)
 
 
 def a_method(body: Callable[..., Any], name: str = "mine") -> Callable[[], Any]:
@@ -401,8 +353,9 @@ def swapped(s: Any, t: Any, h: Any, v: Any, y: Any, dv1: Any, dy1: Any) -> Any:
     return v + dv1, y + dy1, dy1, dv1
 
 
-def rough(s: Any, t: Any, h: Any, v: Any, y: Any) -> Any:
-    return 0 * v, 0 * y, 0 * v, 0 * y
+def two_steps(s: Any, t: Any, h: Any, v: Any, y: Any, dv1: Any, dy1: Any) -> Any:
+    dv, dy = s.dv(t, v, y), s.dy(t, v, y)
+    return v + 1.5 * dv - 0.5 * dv1, y + 1.5 * dy - 0.5 * dy1, dv, dy
 
 
 WRONG: list[tuple[Callable[[], Any], type[StepwellError], str]] = [
@@ -437,25 +390,17 @@ WRONG: list[tuple[Callable[[], Any], type[StepwellError], str]] = [
     (keeping(without_start, lambda s, t, h, v, y: s.dv(t, v, y)), ShapeError, "start: expected 2 blocks"),
     (keeping(without_start, lambda s, t, h, v, y: (y, v)), ShapeError, "expected two blocks of velocities or two of coordinates"),
     (keeping(swapped, one_before), ShapeError, "start returns velocities, coordinates"),
+    (
+        keeping(two_steps, lambda s, t, h, v, y: (0 * v, 0 * y)),
+        UnsupportedError,
+        "start: .* an error of h to the power",
+    ),
 ]
 
 
-@looped("make, error, words", WRONG)
-def test_what_a_method_cannot_be_is_said_in_words(make: Callable[[], Any], error: type[StepwellError], words: str) -> None:
-    with pytest.raises(error, match=words):
-        make()
-
-
-def test_a_start_that_is_too_rough_is_refused() -> None:
-    def again(s: Any, t: Any, h: Any, v: Any, y: Any, dv1: Any, dy1: Any, dv2: Any, dy2: Any) -> Any:
-        dv, dy = s.dv(t, v, y), s.dy(t, v, y)
-        return (v + 23 / 12 * dv - 4 / 3 * dv1 + 5 / 12 * dv2, y + 23 / 12 * dy - 4 / 3 * dy1 + 5 / 12 * dy2, *(dv, dy, dv1, dy1))
-
-    with pytest.raises(UnsupportedError, match="start: expected blocks with which the first step has an error of h to the power"):
-        sw.method(start=rough)(again)
-
-
-def test_blocks_of_another_step_are_refused() -> None:
+def test_what_a_method_cannot_be_is_said_in_words() -> None:
+    """A start that is too rough among them, and blocks of another step."""
+    assert_raises(*WRONG)
     last: list[Any] = []
 
     def leaking(s: Any, t: Any, h: Any, v: Any, y: Any) -> Any:

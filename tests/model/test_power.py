@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import time
-import warnings
 from fractions import Fraction
 from typing import Any
 
 import numpy as np
 import pytest
 import stepwell as sw
+from support.calls import quiet
 from support.cases import Case, cases
 from support.for_each import for_each
 
@@ -87,18 +87,6 @@ def test_direct_and_matrix_agree(case: Case) -> None:
     np.testing.assert_allclose(matrix.v, direct.v, rtol=0, atol=bound)
 
 
-def test_the_misprinted_matrix_of_false_heun_is_not_the_method() -> None:
-    """§10 prints 1 − Φ²/2 in the corner; the program of Appendix B has 1 − Φ² + Φ⁴/2, and so has the method."""
-    phi = 0.9
-    printed = np.array([[1 - phi**2 / 2, -phi * (1 - phi**2 / 2)], [phi * (1 - phi**2 / 2), 1 - phi**2 / 2]])
-    run = sw.integrate(
-        sw.Oscillator(phi), "false_heun", v=np.array([1.0, 0.0]), y=np.array([0.0, 1.0]), dt=1.0, steps=1, form="matrix"
-    )
-    matrix = np.array([run.v[-1], run.y[-1]])
-    assert matrix[1, 1] == pytest.approx(1 - phi**2 + phi**4 / 2, abs=4 * 2 * U)
-    assert matrix[1, 1] - printed[1, 1] == pytest.approx(phi**4 / 2 - phi**2 / 2, abs=4 * 2 * U)
-
-
 def test_against_exact_powers() -> None:
     """False Euler with Φ = 1/2 has the matrix [1, −1/2; 1/2, 3/4], which is exact, and so are its powers in fractions."""
     p = [[Fraction(1), Fraction(-1, 2)], [Fraction(1, 2), Fraction(3, 4)]]
@@ -163,9 +151,7 @@ def test_who_diverged_and_when(every: int | None) -> None:
     """Found by halving, and right but for the rounding of numbers near the end of the range; neighbours do not notice."""
     phi = np.array([[0.5, 2.5, 1.9], [3.0, 1.0, 2.01]])
     options: dict[str, Any] = {"v": 0.0, "y": 1.0, "dt": 1.0, "steps": 8000, "every": every, "start_step": 40}
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", sw.DivergenceWarning)
-        direct = sw.integrate(sw.Oscillator(phi), "false_euler", **options)
+    direct = quiet(sw.Oscillator(phi), "false_euler", **options)
     with pytest.warns(sw.DivergenceWarning, match=r"3 of 6 members diverged; the first was member \(1, 0\) at step"):
         power = sw.integrate(sw.Oscillator(phi), "false_euler", **options, form="power")
     np.testing.assert_array_equal(power.status, direct.status)
@@ -196,10 +182,7 @@ def test_the_first_bad_step_is_exact_where_nothing_rounds(every: int | None) -> 
 def test_a_run_goes_on_after_somebody_diverged() -> None:
     system = sw.Oscillator(np.array([1.0, 2.1, 5.0]))
     options: dict[str, Any] = {"dt": 1.0, "every": 50, "form": "power"}
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", sw.DivergenceWarning)
-        whole = sw.integrate(system, "false_euler", v=0.0, y=1.0, steps=3000, **options)
-        first = sw.integrate(system, "false_euler", v=0.0, y=1.0, steps=500, **options)
+    whole, first = (quiet(system, "false_euler", v=0.0, y=1.0, steps=steps, **options) for steps in (3000, 500))
     assert np.count_nonzero(first.status) == 1
     with pytest.warns(sw.DivergenceWarning, match="^1 of 3 member"):
         second = sw.integrate(system, "false_euler", steps=2500, **options, resume=first)

@@ -25,22 +25,18 @@ LISTED = [1.0, 2.0]
 NAMED = {"k": 1.0}
 
 
-class Settings:
-    k = 1.0
-
-
-SETTINGS = Settings()
+SETTINGS = types.SimpleNamespace(k=1.0)
 
 
 def helper(y: Any) -> Any:
     return SCALE * np.sin(y)
 
 
+CELL = types.SimpleNamespace(k=1.0)
+
+
 def of_helper() -> Any:
     return lambda t, v, y: -helper(y)
-
-
-CELL = types.SimpleNamespace(k=1.0)
 
 
 def of_closure() -> Any:
@@ -58,6 +54,14 @@ def of_inner() -> Any:
     return outer
 
 
+def of_attribute() -> Any:
+    def scaled(y: Any) -> Any:
+        return scaled.k * y  # type: ignore[attr-defined]
+
+    scaled.k = CELL.k  # type: ignore[attr-defined]
+    return lambda t, v, y: -scaled(y)
+
+
 def of_default() -> Any:
     def scaled(y: Any, k: float = CELL.k) -> Any:
         return k * y
@@ -67,20 +71,15 @@ def of_default() -> Any:
 
 CHANGES: dict[str, tuple[Callable[[], Any], Callable[[pytest.MonkeyPatch], None]]] = {
     "a global": (lambda: lambda t, v, y: -SCALE * y, lambda patch: patch.setitem(globals(), "SCALE", 3.0)),
-    "a global of a function that it calls": (
-        lambda: lambda t, v, y: -helper(y),
-        lambda patch: patch.setitem(globals(), "SCALE", 3.0),
-    ),
-    "a function that it calls": (
-        lambda: lambda t, v, y: -helper(y),
-        lambda patch: patch.setitem(globals(), "helper", lambda y: 7.0 * y),
-    ),
+    "a global of a function that it calls": (of_helper, lambda patch: patch.setitem(globals(), "SCALE", 3.0)),
+    "a function that it calls": (of_helper, lambda patch: patch.setitem(globals(), "helper", lambda y: 7.0 * y)),
     "an array in place": (lambda: lambda t, v, y: -TABLE[0] * y, lambda patch: TABLE.__setitem__(0, TABLE[0] + 1.0)),
     "a list": (lambda: lambda t, v, y: -LISTED[0] * y, lambda patch: LISTED.__setitem__(0, LISTED[0] + 1.0)),
     "a dictionary": (lambda: lambda t, v, y: -NAMED["k"] * y, lambda patch: patch.setitem(NAMED, "k", 5.0)),
     "an attribute of an object": (lambda: lambda t, v, y: -SETTINGS.k * y, lambda patch: patch.setattr(SETTINGS, "k", 5.0)),
     "a captured variable": (of_closure, lambda patch: patch.setattr(CELL, "k", 5.0)),
     "a global of a function within it": (of_inner, lambda patch: patch.setitem(globals(), "SCALE", 3.0)),
+    "an attribute of a function": (of_attribute, lambda patch: patch.setattr(CELL, "k", 5.0)),
     "a default": (of_default, lambda patch: patch.setattr(CELL, "k", 5.0)),
 }
 
@@ -124,9 +123,8 @@ def test_the_same_is_traced_once(monkeypatch: pytest.MonkeyPatch) -> None:
         for drive in (0.5, sw.Sinusoid(1.0, 2.0), sw.Sinusoid(0.5, 3.0), sw.Sampled([0.0, 1.0], 0.1)):
             sw.integrate(definition(1.0)(beta=beta, drive=drive), "rk4", v=0.0, y=1.0, dt=0.1, steps=1)
     assert len(traced) == 3  # a number, a sinusoid, samples
-    sw.integrate(definition(2.0)(), "rk4", v=0.0, y=1.0, dt=0.1, steps=1)
-    sw.integrate(definition(-0.0)(), "rk4", v=0.0, y=1.0, dt=0.1, steps=1)
-    sw.integrate(definition(0.0)(), "rk4", v=0.0, y=1.0, dt=0.1, steps=1)
+    for scale in (2.0, -0.0, 0.0):
+        sw.integrate(definition(scale)(), "rk4", v=0.0, y=1.0, dt=0.1, steps=1)
     assert len(traced) == 6
     sw.integrate(definition(1.0)(), "rk4", v=np.zeros((2, 3)), y=np.ones((2, 3)), dt=0.1, steps=1)
     assert len(traced) == 6  # batches change nothing
@@ -163,15 +161,14 @@ def test_other_arguments_are_looked_at_again() -> None:
     assert sw.system(rates).parameters == {"a": 1.0, "b": 2.0}
     rates.__defaults__, rates.__kwdefaults__ = (3.0,), {"b": 4.0}
     assert sw.system(rates).parameters == {"a": 3.0, "b": 4.0}
-    rates.__defaults__ = None
-    with pytest.raises(ArgumentError, match="rates: expected a default of the parameter a"):
-        sw.system(rates)
-    rates.__defaults__, rates.__kwdefaults__ = (3.0,), None
-    with pytest.raises(ArgumentError, match="rates: expected a default of the parameter b"):
-        sw.system(rates)
-    rates.__kwdefaults__ = {"b": np.inf}
-    with pytest.raises(ArgumentError, match="default of b"):
-        sw.system(rates)
+    for positional, named, words in (
+        (None, {"b": 4.0}, "rates: expected a default of the parameter a"),
+        ((3.0,), None, "rates: expected a default of the parameter b"),
+        ((3.0,), {"b": np.inf}, "default of b"),
+    ):
+        rates.__defaults__, rates.__kwdefaults__ = positional, named
+        with pytest.raises(ArgumentError, match=words):
+            sw.system(rates)
     rates.__kwdefaults__ = {"b": 4.0}
     with pytest.raises(ArgumentError, match="expected a default of the parameter y"):
         sw.system(order=1)(lambda t, v, y: y)
@@ -210,8 +207,9 @@ def test_functions_of_the_time_and_invariants_count() -> None:
     start: dict[str, Any] = {"v": 0.0, "y": 1.0, "dt": 0.1, "steps": 2}
     ends = {sw.integrate(with_energy(0.5)(push=lambda t, a=a: a * t), "rk4", **start).y[-1].item() for a in (1.0, 2.0)}
     assert len(ends) == 2
-    assert sw.integrate(with_energy(0.5)(), "rk4", **start, record="energy").recorded["energy"][0] == pytest.approx(0.5, rel=1e-4)
-    assert sw.integrate(with_energy(1.5)(), "rk4", **start, record="energy").recorded["energy"][0] == pytest.approx(1.5, rel=1e-4)
+    for k in (0.5, 1.5):
+        run = sw.integrate(with_energy(k)(), "rk4", **start, record="energy")
+        assert run.recorded["energy"][0] == pytest.approx(k, rel=1e-4)
 
 
 @for_each(

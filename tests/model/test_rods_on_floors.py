@@ -12,6 +12,7 @@ import stepwell as sw
 from stepwell.errors import ArgumentError, ShapeError, UnsupportedError
 from stepwell.reference import joined, rod_contact
 from support import rod_contacts
+from support.calls import assert_raises
 from support.families import family
 from support.looped import looped
 from support.mistakes import mistaken
@@ -83,10 +84,8 @@ def test_the_loss_of_an_elastic_impact_is_of_second_order() -> None:
 
 @looped("method, order", [("false_euler", 1), ("standard_heun", 3), ("rk4", 4), ("dop853", 4)])
 def test_an_end_that_slides_on_a_smooth_floor_leaves_the_order(method: str, order: int) -> None:
-    """Up to 4: the energy that a toppling dumb-bell loses; Heun's is wrong by one order less than its places.
-
-    Higher terms are smaller by h·θ̇, below 2 % here, and bend the exponent by less than twice that.
-    """
+    """Up to 4: the energy that a toppling dumb-bell loses; Heun's is wrong by one order less than its places."""
+    # Higher terms are smaller by h·θ̇, below 2 % here, and bend the exponent by less than twice that.
     lost = []
     for h in (1 / 240, 1 / 480):
         start: dict[str, Any] = {"v": 0.0, "y": tilted(0.3), "dt": h, "steps": round(0.5 / h), "every": 1}
@@ -165,27 +164,25 @@ def test_a_state_that_is_not_finite_stays_so() -> None:
 
 
 def test_what_does_not_go_together_is_refused() -> None:
-    for way in ({"way": "flip"}, {"way": "restitution"}, {"way": "spring", "omega": 9.0}):
-        with pytest.raises(UnsupportedError, match='floor 0: expected way="safe", got'):
-            dumb_bell(floor=sw.Floor(**way))
-    with pytest.raises(ShapeError, match="floor 0: expected vectors of 2 components, got 3"):
-        dumb_bell(floor=sw.Floor(normal=(0.0, 0.0, 1.0)))
-    with pytest.raises(ShapeError, match="floor 1: expected vectors of 3 components, got 2"):
-        sw.Rods([1.0, 1.0], [(0, 1)], 1.0, floor=[sw.Floor(normal=(0, 0, 1)), sw.Floor(normal=(0, 1))])
-    with pytest.raises(ShapeError, match="floor 0: expected vectors of 2 or 3 components, got 1"):
-        sw.Rods([1.0, 1.0], [(0, 1)], 1.0, floor=sw.Floor(normal=(1.0,)))
-    with pytest.raises(ShapeError, match="floor 0: expected vectors of 3 components, got 2"):
-        sw.Pendulum3D(floor=sw.Sphere((0.0, 0.0), 1.0))
+    bell, start, push = dumb_bell(floor=sw.Floor()), {"v": 0.0, "y": tilted(0.3)}, sw.EnergyControl(0.1)
+    in_space, in_plane = sw.Floor(normal=(0, 0, 1)), sw.Floor(normal=(0, 1))
+    other_ways: list[dict[str, Any]] = [{"way": "flip"}, {"way": "restitution"}, {"way": "spring", "omega": 9.0}]
+    assert_raises(
+        *((lambda way=way: dumb_bell(floor=sw.Floor(**way)), 'floor 0: expected way="safe", got') for way in other_ways),
+        (lambda: sw.integrate(bell, "dop853", **start, tolerance=1e-6, at=[1.0]), "the estimated error .* not include a bounce"),
+        (lambda: sw.integrate(bell, "rk4", **start, dt=0.1, steps=1, control=push), "meets surfaces"),
+        kind=UnsupportedError,
+    )
+    assert_raises(
+        (lambda: dumb_bell(floor=in_space), "floor 0: expected vectors of 2 components, got 3"),
+        (lambda: sw.Rods([1.0, 1.0], [(0, 1)], 1.0, floor=[in_space, in_plane]), "floor 1: expected vectors of 3 .*, got 2"),
+        (lambda: sw.Rods([1.0, 1.0], [(0, 1)], 1.0, floor=sw.Floor(normal=(1,))), "floor 0: .* vectors of 2 or 3 .*, got 1"),
+        (lambda: sw.Pendulum3D(floor=sw.Sphere((0.0, 0.0), 1.0)), "floor 0: expected vectors of 3 components, got 2"),
+        kind=ShapeError,
+    )
     with pytest.raises(ArgumentError, match="floor: expected at most 100 pairs of a point and a surface, got 60 points and 2"):
         sw.Rods(np.ones(60), [(i, i + 1) for i in range(59)], 1.0, floor=[sw.Floor()] * 2)
-    bell, start = dumb_bell(floor=sw.Floor()), {"v": 0.0, "y": tilted(0.3)}
-    with pytest.raises(UnsupportedError, match="tolerance: the estimated error of a step does not include a bounce"):
-        sw.integrate(bell, "dop853", **start, tolerance=1e-6, at=[1.0])
-    with pytest.raises(UnsupportedError, match="meets surfaces"):
-        sw.integrate(bell, "rk4", **start, dt=0.1, steps=1, control=sw.EnergyControl(0.1))
 
-
-# ---- mistakes that must be noticed
 
 #: Checks that are made by methods whose velocity is not at the same time as y, too.
 LAGGING = dict.fromkeys(("drops_as_a_ball", "adds_no_energy", "slides_to_rest"), ("standard_euler",))

@@ -62,10 +62,8 @@ def test_without_a_spring_the_velocity_is_the_sum_of_the_samples(name: str, step
 @for_each("share", [1e-9, 1e-7, 1e-6, 1e-5, -1e-6])
 @for_each("name", ["rk4", "merson", "fehlberg_5", "dop853", "pefrl", "leapfrog"])
 def test_samples_that_begin_a_little_off_a_step(name: str, share: float) -> None:
-    """The mean over a step is that of the true input, so v is right at its end; the place errs by (h/2)·δ·|a₂ − a₁| a sample.
-
-    The errors turn with the oscillator, which also makes v of y by ω; two more for what the method itself makes of them.
-    """
+    """The mean over a step is that of the true input, so v is right at its end; the place errs by (h/2)·δ·|a₂ − a₁| a sample."""
+    # The errors turn with the oscillator, which also makes v of y by ω; two more for what the method itself makes of them.
     steps, shift = 200, share * INTERVAL
     own = error(name, steps)
     bound = 2.0 * OMEGA * 0.5 * (END / steps) * abs(shift) * abs(np.diff(VALUES)).sum()
@@ -105,9 +103,7 @@ KINDS: dict[str, Any] = {
 }
 
 
-@sw.system
-def pushed(t: Any, v: Any, y: Any, *, push: Any = 0.0) -> Any:
-    return push - y - 0.1 * y**3
+pushed = sw.system(lambda t, v, y, *, push=0.0: push - y - 0.1 * y**3)
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -132,11 +128,7 @@ def test_every_kind_goes_every_way(kind: str) -> None:
 
 def test_large_own_equations() -> None:
     """Past what becomes one tape for a step: rates are told the window of the step that asks."""
-
-    @sw.system
-    def ring(t: Any, v: Any, y: Any, *, push: Any = 0.0) -> Any:
-        return push * np.cos(y) - (2.0 * y - np.roll(y, 1) - np.roll(y, -1)) ** 3
-
+    ring = sw.system(lambda t, v, y, *, push=0.0: push * np.cos(y) - (2.0 * y - np.roll(y, 1) - np.roll(y, -1)) ** 3)
     r = np.random.default_rng(3)
     for method, values in (("dop853", r.normal(size=30)), ("verlet", r.normal(size=(30, 2)))):
         # Past three samples: NumPy computes each of the 60 rates on its own.

@@ -23,11 +23,10 @@ from stepwell.errors import DTypeError, ShapeError, UnsupportedError
 from stepwell.model import surfaces
 from stepwell.reference import contact
 from stepwell.runs.engine import direct
+from support.calls import assert_raises
+from support.contacts import G, set_mistaken
 from support.looped import looped
-from support.mistakes import mistaken
 from support.ways import assert_equal_ways
-
-G = 9.81
 
 #: Energies are sums of some hundred terms, each with some roundings.
 ROUNDING = 1000 * 2.0**-53
@@ -100,9 +99,7 @@ def test_no_step_adds_more_energy_than_springs_can_take(floor: str) -> None:
     ],
 )
 def test_a_mistake_in_a_net_is_noticed(old: str, new: str, monkeypatch: Any) -> None:
-    wrong = mistaken(contact, old, new)
-    monkeypatch.setattr(surfaces, "contact", wrong)
-    monkeypatch.setattr(direct, "contact", wrong)
+    set_mistaken(monkeypatch, old, new)
     with pytest.raises(AssertionError):
         no_energy_beyond_the_bound(sw.Floor(), backend="numpy", heights=(0.3,))
 
@@ -176,9 +173,7 @@ def test_fixed_particles_pass_through_surfaces(way: dict[str, Any], n: int, back
     ],
 )
 def test_a_mistake_about_fixed_particles_is_noticed(way: dict[str, Any], old: str, new: str, monkeypatch: Any) -> None:
-    wrong = mistaken(contact, old, new)
-    monkeypatch.setattr(surfaces, "contact", wrong)
-    monkeypatch.setattr(direct, "contact", wrong)
+    set_mistaken(monkeypatch, old, new)
     with pytest.raises(AssertionError):
         fixed_particles_pass_through(way, 2, "numpy")
 
@@ -200,21 +195,69 @@ def test_a_large_net_has_the_same_bits_in_every_way(method: str) -> None:
     np.testing.assert_array_equal(run.y, sw.integrate(net, method, **start, threads=1).y)
 
 
-def test_the_safe_step_is_that_without_the_floor() -> None:
-    assert jelly(floor=sw.Floor())[0].safe_step("rk4") == jelly()[0].safe_step("rk4")
-
-
 def test_what_does_not_go_together_is_refused() -> None:
-    with pytest.raises(DTypeError, match="floor: expected a Floor, a Sphere, a list of them or None, got int"):
-        sw.Springs([(0, 1)], rest=1.0, floor=1)
-    with pytest.raises(ShapeError, match="gravity and floor 0: expected one number of dimensions"):
-        sw.Springs([(0, 1)], rest=1.0, gravity=(0.0, -1.0), floor=sw.Sphere((0.0, 0.0, 0.0), 1.0))
-    net = sw.Springs([(0, 1)], rest=1.0, floor=sw.Floor())
+    net, onto = sw.Springs([(0, 1)], rest=1.0, floor=sw.Floor()), sw.Projection()
+    ball = sw.Sphere((0.0, 0.0, 0.0), 1.0)
+    step: dict[str, Any] = {"v": 0.0, "y": np.eye(2), "dt": 0.1, "steps": 1}
+    one_number = "gravity and floor 0: expected one number of dimensions"
+    assert_raises(
+        (lambda: sw.Springs([(0, 1)], rest=1.0, floor=1), DTypeError, "floor: expected a Floor, .* or None, got int"),
+        (lambda: sw.Springs([(0, 1)], rest=1.0, gravity=(0.0, -1.0), floor=ball), ShapeError, one_number),
+        (lambda: sw.integrate(net, "rk4", **step, control=onto), UnsupportedError, "control: .* meets surfaces"),
+    )
     assert "floor=Floor(offset=0.0" in repr(net)
-    with pytest.raises(UnsupportedError, match=r"control: .* meets surfaces"):
-        sw.integrate(net, "rk4", v=0.0, y=np.eye(2), dt=0.1, steps=1, control=sw.Projection())
-    assert sw.Springs([(0, 1)], rest=1.0, floor=sw.Sphere((0.0, 0.0, 0.0), 1.0)).dim == 3
+    assert sw.Springs([(0, 1)], rest=1.0, floor=ball).dim == 3
+    assert jelly(floor=sw.Floor())[0].safe_step("rk4") == jelly()[0].safe_step("rk4")
 
 
 def test_the_module_that_is_changed_is_the_one_that_runs() -> None:
     assert surfaces.contact is direct.contact is contact
+
+
+def rope(stiffness: float, floor: Any = None) -> tuple[sw.Springs, Any]:
+    """5 m in 20 points of 1 kg, level at a height of 2.5 m; the first point is fixed."""
+    y = np.stack([np.linspace(0.0, 5.0, 20), np.full(20, 2.5)], axis=1)
+    pairs = [(i, i + 1) for i in range(19)]
+    return sw.Springs(pairs, stiffness=stiffness, layout=y, fixed=[0], gravity=(0.0, -G), floor=floor), y
+
+
+IMPLICIT = [m.name for m in sw.methods() if m.is_implicit]
+
+
+@looped("method", IMPLICIT)
+def test_an_implicit_step_with_bounces_is_no_longer_than_explicit_ones_may_be(method: str) -> None:
+    net, y = rope(1e4, sw.Floor(restitution=0.0))
+    longest = float(net.safe_step("false_euler"))
+    run = sw.integrate(net, method, v=0.0, y=y, dt=longest, steps=300, every=1)
+    assert run.energy.max() <= run.energy[0] * (1.0 + 1e-3)
+    assert not run.findings
+    with pytest.raises(UnsupportedError, match=rf"dt: expected at most 0.01, got 0.0101: {method} solves for .*Floor\(way="):
+        sw.integrate(net, method, v=0.0, y=y, dt=1.01 * longest, steps=1)
+    with pytest.raises(UnsupportedError, match="dt: expected at most"):
+        sw.World(net, method, v=np.zeros_like(y), y=y.copy(), dt=1.01 * longest)
+    soft, y = rope(1e4, sw.Floor(way="spring", omega=100.0))
+    assert np.isfinite(sw.integrate(soft, method, v=0.0, y=y, dt=1.01 * longest, steps=10).y).all()
+
+
+@looped("stiffness", [1e3, 1e4, 1e7])
+def test_passes_that_lead_away_are_not_made(stiffness: float) -> None:
+    """The rope swings down and its energy decays; three passes of Newton's method lead away in some of its steps."""
+    net, y = rope(stiffness)
+    for method in ("backward_euler", "linearly_implicit_euler"):
+        run = sw.integrate(net, method, v=0.0, y=y, dt=1 / 60, steps=600, every=1)
+        assert run.energy.max() <= run.energy[0] * (1.0 + 1e-12), method
+        assert not run.findings, method
+
+
+@pytest.mark.parametrize("backend", ["rust", "numpy"])
+def test_a_net_that_gained_energy_is_named(backend: Any) -> None:
+    net, y = rope(1e6)
+    start: dict[str, Any] = {"v": 0.0, "y": y, "dt": 1 / 60, "every": 5, "backend": backend}
+    with pytest.warns(
+        sw.AccuracyWarning, match="the run gained energy, .* never give: up to .* from .*, so implicit_midpoint with dt"
+    ):
+        sw.integrate(net, "implicit_midpoint", **start, steps=100)
+    heights = np.stack([y, y], axis=-1)
+    two = sw.Springs(net.pairs, stiffness=[[1e2, 1e6]], rest=net.rest, fixed=[0], gravity=(0.0, -G))
+    with pytest.warns(sw.AccuracyWarning, match=r"1 of 2 members gained energy, .*: member 1 has up to"):
+        sw.integrate(two, "implicit_midpoint", **start | {"y": heights}, steps=100)

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 import pytest
 import stepwell as sw
-from stepwell.errors import ToleranceWarning
+from scipy.special import ive
+from stepwell.errors import AccuracyWarning, ToleranceWarning
 from stepwell.model.equations import switching
 from support.looped import looped
 from support.ways import WAYS, assert_equal_ways
@@ -87,12 +89,65 @@ def test_parameters_of_each_member() -> None:
     assert times[:, 2] == pytest.approx(np.array([[0.0, 2.0], [6.0, 8.0]]), rel=1e-15, abs=1e-15)
 
 
-def test_too_many_periods_are_no_pulses() -> None:
-    """Up to 4096 periods within a run are solved, with one more at each side."""
+def test_too_many_switches_are_said(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of all members together, with one period more at each side."""
     fast = lambda t, y, *, period=1.0: np.where(t % period < 0.5 * period, 1.0, 0.0) - y  # noqa: E731
-    most = switching.MOST_PERIODS
-    assert len(times_of(fast, end=(most - 3.0) * 0.125, period=0.125)) > most
-    assert len(times_of(fast, end=(most + 3.0) * 0.125, period=0.125)) == 0
+    monkeypatch.setattr(switching, "MOST_TIMES", 3000)
+    for period, most in ((0.125, 3000), ([0.125, 0.25], 1500)):
+        assert len(times_of(fast, end=(most - 3.0) * 0.125, period=period)) > most
+        with pytest.warns(AccuracyWarning, match=r"switch by the time more than 3000 times in this run, .* max_step="):
+            assert len(times_of(fast, end=(most + 3.0) * 0.125, period=period)) == 0
+
+
+#: Bells and pulses that repeat, which steps would miss, and their integrals over 500 units of time.
+REPEATING: dict[str, tuple[Callable[[Any], Any], float]] = {
+    "bell, by a remainder": (lambda t: np.exp(-((((t % 10.0) - 5.0) / 0.01) ** 2)), 50.0 * 0.01 * math.sqrt(math.pi)),
+    "von Mises' bell": (lambda t: np.exp(2000.0 * (np.cos(0.2 * np.pi * t) - 1.0)), 500.0 * ive(0, 2000.0)),
+    "bell of a sine": (lambda t: np.exp(-1000.0 * np.sin(0.1 * np.pi * t) ** 2), 500.0 * ive(0, 500.0)),
+    "peak": (lambda t: 1.0 / (1.0 + (np.sin(0.1 * np.pi * t) / 1e-3) ** 2), 500.0 / math.sqrt(1.0 + 1e6)),
+    "pulses": (lambda t: np.where(t % 0.05 < 1e-5, 1.0, 0.0), 0.1),
+}
+
+
+@looped("name", REPEATING)
+def test_narrow_bells_and_pulses_that_repeat_are_not_missed(name: str) -> None:
+    pulses, expected = REPEATING[name]
+    for method in ("dop853", "rodas5p"):
+        run = sw.integrate(sw.system(order=1)(lambda t, y: pulses(t) + 0.0 * y), method, y=0.0, tolerance=1e-6, at=[500.0])
+        assert run.y[-1] == pytest.approx(expected, rel=1e-3), method
+
+
+def test_steps_do_not_end_at_the_turns_of_waves() -> None:
+    """Neither of waves themselves, nor of what has their width; where parameters make it narrow for some members, for these."""
+    for wave in (lambda t, y: np.sin(t) ** 2, lambda t, y: np.exp(np.cos(t)), lambda t, y: np.tanh(np.sin(t)) - y):
+        assert np.isnan(times_of(wave, end=100.0)).all()
+    times = times_of(lambda t, y, *, k=1.0: np.exp(k * (np.cos(t) - 1.0)) - y, end=100.0, k=[1.0, 100.0])
+    assert np.isnan(times[:, 0]).all()
+    of_second = np.unique(np.round(times[:, 1] / (2.0 * np.pi), 9))
+    assert np.array_equal(of_second, np.arange(of_second[0], of_second[-1] + 1.0))
+    assert of_second[0] <= 0.0
+    assert of_second[-1] >= 15.0
+
+
+@pytest.mark.filterwarnings("ignore:method")
+@looped("method", ["DOP853", "Radau", "LSODA"])
+def test_solve_ivp_has_the_same_switches(method: str) -> None:
+    """Forwards and backwards, and between the ends of its steps."""
+    pulse = lambda t, y: [np.where((t > 5.0) & (t < 5.01), 1.0, 0.0)]  # noqa: E731
+    for options in ({}, {"dense_output": True}, {"t_eval": [0.0, 5.004, 20.0]}):
+        found = sw.solve_ivp(pulse, (0.0, 20.0), [0.0], method=method, **options)
+        assert found.y[0, -1] == pytest.approx(0.01, rel=1e-9)
+    assert found.y[0, 1] == pytest.approx(0.004, rel=1e-9)
+    back = sw.solve_ivp(pulse, (20.0, 0.0), [0.01], method=method, dense_output=True)
+    assert back.sol([5.02, 5.004, 0.0])[0] == pytest.approx([0.01, 0.004, 0.0], rel=1e-9, abs=1e-11)
+
+
+@looped("method", ["rodas5p", "rosenbrock23", "dop853"])
+def test_a_pulse_of_two_ramps_is_met_from_rest(method: str) -> None:
+    """Where both are rounded to 1 the rates are zero, and so are their derivatives."""
+    system = sw.system(order=1)(lambda t, y: np.tanh((t - 5.0) / 0.01) - np.tanh((t - 5.2) / 0.01) + 0.0 * y)
+    run = sw.integrate(system, method, y=0.0, tolerance=1e-4, at=[10.0], max_steps=10_000)
+    assert run.y[-1] == pytest.approx(0.4, rel=1e-3)
 
 
 @sw.system(order=1)
@@ -109,10 +164,8 @@ def solution(t: Any, a: Any, w: Any) -> Any:
 
 @looped("method", PAIRS)
 def test_no_pulse_is_missed(method: str) -> None:
-    """However short, and however far a state that is nearly at rest lets steps go.
-
-    Some tens of steps at the edges may each err by the tolerance of the largest that y has been, 20 at most.
-    """
+    """However short, and however far a state that is nearly at rest lets steps go."""
+    # Some tens of steps at the edges may each err by the tolerance of the largest that y has been, 20 at most.
     random = np.random.default_rng(5)
     a, w = random.uniform(5.0, 190.0, 100), 10.0 ** random.uniform(-4.0, 0.5, 100)
     at = np.array([100.0, 200.0])
@@ -138,10 +191,8 @@ SMOOTH: dict[str, tuple[Callable[..., Any], float]] = {
 
 @looped("what, method", itertools.product(SMOOTH, PAIRS[::3]), long=itertools.product(SMOOTH, PAIRS[1:3]))
 def test_no_smooth_push_is_missed(what: str, method: str) -> None:
-    """Of a width w, y becomes ∫f dt·(1 + O(w)) at its end, and decays by less than 1 % in the 40 w that pass until then.
-
-    Without the middle as a wall nine of ten are passed over.
-    """
+    """Of a width w, y becomes ∫f dt·(1 + O(w)) at its end, and decays by less than 1 % in the 40 w that pass until then."""
+    # Without the middle as a wall nine of ten are passed over.
     function, integral = SMOOTH[what]
     m, w = np.linspace(5.0, 45.0, 100), 10.0 ** -np.linspace(2.0, 5.0, 4)[:, np.newaxis]
     run = sw.integrate(sw.system(order=1)(function)(m=m, w=w), method, y=0.0, tolerance=1e-6, at=(m + 30 * w)[np.newaxis])
@@ -150,10 +201,8 @@ def test_no_smooth_push_is_missed(what: str, method: str) -> None:
 
 @looped("method", PAIRS)
 def test_a_state_that_grows_out_of_zero(method: str) -> None:
-    """Through the smallest numbers there are, of few bits: it is not held up there by errors that are roundings.
-
-    Of some 700 e-foldings from there on, up to a push of 1, a method of fourth order takes ten steps each at most.
-    """
+    """Through the smallest numbers there are, of few bits: it is not held up there by errors that are roundings."""
+    # Of some 700 e-foldings from there on, up to a push of 1, a method of fourth order takes ten steps each at most.
     function = SMOOTH["a bell"][0]
     run = sw.integrate(sw.system(order=1)(function)(m=20.0, w=0.1), method, y=0.0, tolerance=1e-6, at=[23.0])
     assert run.y[-1] == pytest.approx(0.1 * np.sqrt(np.pi) * np.exp(-3.0 + 0.0025), rel=1e-3)
@@ -186,23 +235,14 @@ def test_an_excitable_cell_is_pulsed_at_its_equilibrium(method: str) -> None:
 @looped("method", PAIRS[::3])
 def test_the_same_bits_in_every_way(method: str) -> None:
     a, w = np.array([50.0, 51.9, 20.0, 20.0, 50.0]), np.array([0.3, 0.01, 0.01, 0.3, 0.01])
-    options: dict[str, Any] = {
-        "v": np.zeros((0, 5)),
-        "y": np.ones(5),
-        "tolerance": 1e-7,
-        "at": np.array([10.0, 49.0, 50.1, 52.0]),
-    }
-    assert_equal_ways(pulsed(a=a, w=w), method, **options, ways=[way for way in WAYS if way != "in a world"])
+    start, ways = {"v": np.zeros((0, 5)), "y": np.ones(5)}, [way for way in WAYS if way != "in a world"]
+    assert_equal_ways(pulsed(a=a, w=w), method, **start, tolerance=1e-7, at=np.array([10.0, 49.0, 50.1, 52.0]), ways=ways)
 
 
 @looped("method", PAIRS)
 def test_periodic_pulses_in_pieces(method: str) -> None:
     """A run that ends goes on to switches that lay beyond its end: the next of them was its wall already."""
-
-    @sw.system(order=1)
-    def ticking(t: Any, y: Any, *, period: float = 7.0) -> Any:
-        return np.where(t % period < 0.01, 30.0, 0.0) - 0.1 * y
-
+    ticking = sw.system(order=1)(lambda t, y, *, period=7.0: np.where(t % period < 0.01, 30.0, 0.0) - 0.1 * y)
     at = np.linspace(3.0, 60.0, 20)
     whole = sw.integrate(ticking(), method, y=1.0, tolerance=1e-7, at=at)
     pushes = 7.0 * np.arange(9)[:, np.newaxis]
@@ -221,11 +261,6 @@ def test_backward() -> None:
     assert run.y == pytest.approx(solution(np.array([50.3, 49.0]), 50.0, 0.3), abs=54 * 50 * 5.2e-12)
 
 
-def test_sweeps_and_solve_ivp() -> None:
-    """They take the same steps."""
-    pytest.importorskip("xarray")
-    table = sw.sweep(pulsed, {"a": ("run", [20.0, 50.0])}, "merson", y=1.0, tolerance=1e-7, at=[51.0])
-    runs = sw.integrate(pulsed(a=[20.0, 50.0]), "merson", y=1.0, tolerance=1e-7, at=[51.0])
-    assert np.array_equal(table["y_last"].values.ravel(), runs.y[-1])
+def test_solve_ivp_takes_the_same_steps() -> None:
     by_scipys_name = sw.solve_ivp(lambda t, y: np.where(t > 50, 20.0, 0.0) - y, (0.0, 51.0), [1.0], rtol=1e-8, atol=1e-12)
     assert by_scipys_name.y[0, -1] == pytest.approx(20.0 * -np.expm1(-1.0), rel=1e-6)

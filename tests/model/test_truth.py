@@ -56,8 +56,11 @@ def test_the_documents_own_program(method: str) -> None:
 @for_each("block", ["v", "y"])
 def test_order_on_a_forced_system(method: str, block: str) -> None:
     """A damped oscillator (undamped for Verlet) driven by a sinusoid: a wrong stage time costs the order here."""
-    measured = slope(lambda dt: forced_error(method, dt, block))
-    assert measured == pytest.approx(sw.method(method).order, abs=0.2 if method == "rodas5p" else 0.1)
+    measured, order = slope(lambda dt: forced_error(method, dt, block)), sw.method(method).order
+    if method in ("tsit5", "vern7", "vern9"):  # the next power rules until rounding does; their conditions: test_orders.py
+        assert measured > order - 0.1
+    else:
+        assert measured == pytest.approx(order, abs=0.2 if method == "rodas5p" else 0.1)
 
 
 @for_each("start", sw.method("verlet").starts)
@@ -101,14 +104,6 @@ def test_damped_euler_in_both_forms() -> None:
         v, y = damped_form(phi, v, y)
 
 
-def test_damped_euler_is_false_euler_with_the_blocks_exchanged() -> None:
-    """On ẏ = ω₀v, v̇ = −ω₀y the exchange is (v, y) → (−y, v) or (y, −v), and the same to the last bit."""
-    damped = sw.integrate(sw.Oscillator(0.9), "damped_euler", v=0.2, y=1.0, dt=1.0, steps=300, every=1)
-    false = sw.integrate(sw.Oscillator(0.9), "false_euler", v=1.0, y=-0.2, dt=1.0, steps=300, every=1)
-    np.testing.assert_array_equal(damped.y, false.v)
-    np.testing.assert_array_equal(damped.v, -false.y)
-
-
 def test_verlet_of_first_order_is_false_euler() -> None:
     """The seed's start makes Verlet's y False Euler's, up to the rounding of a two-step recursion (n² eps)."""
     arguments = {"v": 0.4, "y": 1.0, "dt": 0.5, "steps": 100, "every": 1}
@@ -133,14 +128,3 @@ def test_each_limit_from_both_sides(method: str) -> None:
     # least 1e-3·|dz/dlnΦ|; the flattest of these methods grows by more than e⁷ in so many steps.
     assert size[0] < 50
     assert size[1] > 1e3
-
-
-@for_each("method", ["standard_euler", "standard_heun"])
-def test_never_stable_means_never(method: str) -> None:
-    """Φ = 0.05: Standard Euler and Heun grow at the predicted rate, r₁² = 1 + Φ² and 1 + Φ⁴/4."""
-    phi, steps = 0.05, 100_000
-    assert sw.method(method).limit == 0
-    gain = {"standard_euler": 1 + phi**2, "standard_heun": 1 + phi**4 / 4}[method]
-    run = sw.integrate(sw.Oscillator(phi), method, v=0.0, y=1.0, dt=1.0, steps=steps)
-    # The radius is exact but for the rounding of each step: relative steps·eps in the logarithm.
-    assert np.log(run.energy[-1] * 2) == pytest.approx(steps * np.log(gain), abs=10 * steps * np.finfo(float).eps)

@@ -1,7 +1,5 @@
 """A new method is two files, a new system three: those of ``docs/developing/adding.md`` are tested in a copy of the tree."""
 
-from __future__ import annotations
-
 import os
 import re
 import shutil
@@ -160,10 +158,8 @@ def test_it_is_the_method_of_that_name(tree: Path) -> None:
 
 
 def test_it_is_the_system_of_that_name(tree: Path) -> None:
-    """Every start but rest ends on the limit cycle, whose amplitude at μ = 1 is 2.00862 and whose period 6.66329 (Urabe 1967).
-
-    Steps of 0.01 see a maximum up to 0.005² · |ÿ|/2 ≤ 5e-5 too low, and 50 periods to within 0.01/50.
-    """
+    """Every start but rest ends on the limit cycle, whose amplitude at μ = 1 is 2.00862 and whose period 6.66329 (Urabe 1967)."""
+    # Steps of 0.01 see a maximum up to 0.005² · |ÿ|/2 ≤ 5e-5 too low, and 50 periods to within 0.01/50.
     code = (
         "import numpy as np, stepwell as sw\n"
         "y = np.geomspace(0.01, 4.0, 1000)\n"

@@ -50,7 +50,7 @@ def off(values, encoding):
 
 
 @needs_node
-def test_places_in_a_page_are_the_states(tmp_path):
+def test_places_in_a_page_are_the_states_and_on_a_phone_panels_are_below_each_other(tmp_path):
     for name in ("figure_eight", "arenstorf", "double_pendulum", "jelly_cube", "plummer", "conical_pendulum"):
         scene = sw.scenes.scene(name)
         chart = own_picture(scene.run("rk4", steps=60, every=1))
@@ -65,17 +65,7 @@ def test_places_in_a_page_are_the_states(tmp_path):
         springs = getattr(scene.system, "pairs", None)
         if springs is not None:
             np.testing.assert_array_equal(np.array(panel["links"]), springs)
-
-
-ARRANGING = """
-const panels = JSON.parse(require("node:fs").readFileSync("panels.json", "utf8"));
-console.log(JSON.stringify([390, 1000].map((width) => ({ size: arranged(panels, width), places: panels.map((p) => p.place) }))));
-"""
-
-
-@needs_node
-def test_on_a_phone_panels_are_below_each_other(tmp_path):
-    """Each as wide as the page, in units of about a pixel, so that a text of 13 to 15 of them is read."""
+    # Each as wide as the page, in units of about a pixel, so that a text of 13 to 15 of them is read.
     script = (page_animation.WEB / "animation.js").read_text(encoding="utf-8")
     (tmp_path / "run.js").write_text(script + ARRANGING, encoding="utf-8")
     for name in ("clover", "rope_bridge", "aircraft", "chain", "oscillator"):
@@ -92,6 +82,12 @@ def test_on_a_phone_panels_are_below_each_other(tmp_path):
             bottom = top + height
         assert bottom <= 1.0, name
         assert wide["places"] == [list(panel["rect"]) for panel in panels]
+
+
+ARRANGING = """
+const panels = JSON.parse(require("node:fs").readFileSync("panels.json", "utf8"));
+console.log(JSON.stringify([390, 1000].map((width) => ({ size: arranged(panels, width), places: panels.map((p) => p.place) }))));
+"""
 
 
 @pytest.mark.mutant

@@ -1,7 +1,5 @@
 """The comparison with other languages: it runs, and no speed stands without its error."""
 
-from __future__ import annotations
-
 import functools
 import itertools
 import json
@@ -29,16 +27,7 @@ from benches.compare.chosen import orbits, solar, tables
 from benches.compare.chosen.contestants import Contestant as Adaptive
 from benches.compare.own import first_call, tolerance
 from benches.compare.own.equations import EQUATIONS, Equation
-from benches.compare.peers import (
-    c_peer,
-    heyoka_peer,
-    jax_peer,
-    numba_own,
-    numba_peer,
-    rebound_peer,
-    scipy_peer,
-    stepwell_peer,
-)
+from benches.compare.peers import c_peer, heyoka_peer, jax_peer, numba_own, numba_peer, rebound_peer, scipy_peer, stepwell_peer
 
 WORKS = [work.quick().cut(members=200) for work in workloads.catalogue()]
 
@@ -161,7 +150,14 @@ def test_a_tolerance_is_the_coarsest_that_is_exact_enough() -> None:
         tolerance.as_exact(work, lambda part, wanted: off_by_the_tolerance(part, 1.0))
 
 
-def test_tracing_and_compiling_has_a_line_for_each_system() -> None:
+def test_own_equations_have_a_line_for_each_system_and_way_of_numba() -> None:
+    work = next(work for work in WORKS if work.kind == "own_lorenz")
+    names = [contestant.name for contestant in numba_own.CONTESTANTS]
+    assert list(work.beside) == names
+    rows = [runner.Row(name, amount=1.0, seconds=[seconds]) for name, seconds in zip(names, (1.0, 2.0, 4.0), strict=True)]
+    _, head, lines = report.table(work, [*rows, runner.Row("other", amount=1.0, seconds=[0.5])])
+    assert head[4:-1] == [f"÷ {name}" for name in names]
+    assert lines[0][4:-1] == ["2.00", "4.00", "8.00"]
     title, head, lines = first_call.table(2, True, Budget(600.0))
     assert "Own equations" in title
     assert [(line[1], line[-2]) for line in lines] == [("3", "≤ 5"), ("10", "≤ 100")]
@@ -170,16 +166,6 @@ def test_tracing_and_compiling_has_a_line_for_each_system() -> None:
         python, trace, code, together = map(float, line[2:6])
         assert together == pytest.approx(python + trace + code, rel=0.01)  # three digits of each
         assert min(python, trace, code) > 0
-
-
-def test_own_equations_are_compared_with_every_way_of_numba() -> None:
-    work = next(work for work in WORKS if work.kind == "own_lorenz")
-    names = [contestant.name for contestant in numba_own.CONTESTANTS]
-    assert list(work.beside) == names
-    rows = [runner.Row(name, amount=1.0, seconds=[seconds]) for name, seconds in zip(names, (1.0, 2.0, 4.0), strict=True)]
-    _, head, lines = report.table(work, [*rows, runner.Row("other", amount=1.0, seconds=[0.5])])
-    assert head[4:-1] == [f"÷ {name}" for name in names]
-    assert lines[0][4:-1] == ["2.00", "4.00", "8.00"]
 
 
 def cells(line: str) -> list[str]:
@@ -226,33 +212,18 @@ def test_the_quick_run_writes_a_report(tmp_path: Path, only: tuple[str, ...]) ->
     assert "\n## Left out\n\n- of a quick run, all but the first work of a class" in report
 
 
-def test_works_that_are_done_again_replace_their_own_part_of_a_report() -> None:
-    before = "# Title\n\n- date: 1999-01-01\n\n## How to read\n\nText.\n\n## W1: old\n\n| 1 |\n\n## W2: kept\n\n| 2 |\n"
-    now = "# Title\n\n- date: 2000-01-01\n\n## How to read\n\nText.\n\n## W1: old\n\n| 3 |\n\n## W3: new\n\n| 4 |\n"
-    text = report.renewed(before, now, "W1,W3")
-    assert text == (
-        "# Title\n\n- date: 1999-01-01\n- done again in a run of their own, 2000-01-01: W1,W3\n\n## How to read\n\nText.\n\n"
-        "## W1: old\n\n| 3 |\n\n## W2: kept\n\n| 2 |\n\n## W3: new\n\n| 4 |\n"
-    )
-    assert report.renewed(text, now, "W1,W3") == text
-
-
-def test_who_does_not_end_is_ended_and_told(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_who_does_not_end_is_ended_and_who_is_not_installed_is_not_measured(monkeypatch: pytest.MonkeyPatch) -> None:
     """A hundred million years take hours; a process of its own has some seconds, most of which its imports may need."""
     begin = time.perf_counter()
     measured = solar.measured("stepwell taylor", (10.0, 1e8), 3.0)
     assert time.perf_counter() - begin < 20.0
-    assert measured is not None
     assert len(measured) <= 1
     monkeypatch.setattr(solar, "BUDGET", 3.0)
     _, head, lines = solar.table((1.0, 1e8), Budget(600.0))
     row = next(line for line in lines if line[0] == "stepwell taylor")
     assert row[-3:] == ["—", "—", "stopped after 3 s"]
     assert len(row) == len(head)
-
-
-def test_who_is_not_installed_is_not_measured(monkeypatch: pytest.MonkeyPatch) -> None:
-    """And what fails is not taken for missing."""
+    # And what fails is not taken for missing.
     monkeypatch.setattr(solar, "contestants", lambda: {"heyoka": None, "nobody": None})
     if find_spec("heyoka") is None:
         assert solar.measured("heyoka", (1.0,), 60.0) is None
@@ -339,7 +310,7 @@ def test_who_runs_away_from_orbits_is_stopped_and_findings_are_counted(monkeypat
     ]
 
 
-def test_all_that_was_left_out_is_listed() -> None:
+def test_all_that_was_left_out_is_listed_and_what_is_done_again_replaced() -> None:
     head = ["contestant", "G steps/s", "min … max", "error", "÷ C", "remarks"]
     right = ["stepwell", "1", "1 … 1", "1e-03", "—", ""]
     absent, wrong = (["C", *["—"] * 4, "no C compiler"], ["numba", *["—"] * 4, "not timed: error 1"])
@@ -353,22 +324,30 @@ def test_all_that_was_left_out_is_listed() -> None:
         "- merson, 1e-06: not as exact, or not in time (Chosen)",
     ]
     assert report.left_out(report.markdown("W1", head, [right])).splitlines()[2:] == ["Nothing."]
+    before = "# Title\n\n- date: 1999-01-01\n\n## How to read\n\nText.\n\n## W1: old\n\n| 1 |\n\n## W2: kept\n\n| 2 |\n"
+    now = "# Title\n\n- date: 2000-01-01\n\n## How to read\n\nText.\n\n## W1: old\n\n| 3 |\n\n## W3: new\n\n| 4 |\n"
+    text = report.renewed(before, now, "W1,W3")
+    assert text == (
+        "# Title\n\n- date: 1999-01-01\n- done again in a run of their own, 2000-01-01: W1,W3\n\n## How to read\n\nText.\n\n"
+        "## W1: old\n\n| 3 |\n\n## W2: kept\n\n| 2 |\n\n## W3: new\n\n| 4 |\n"
+    )
+    assert report.renewed(text, now, "W1,W3") == text
 
 
-def test_a_part_leaves_what_it_does_not_need() -> None:
+def test_the_gate_fails_where_all_of_the_spread_is_too_low_and_a_part_leaves_what_it_does_not_need() -> None:
     whole = Budget(100.0, 10)
     assert whole.part().seconds == pytest.approx(10.0 * budget.SHARES, abs=1.0)
     for _ in range(8):
         assert whole.part().seconds <= 51.0
     assert whole.part().seconds == pytest.approx(100.0, abs=1.0)
     assert Budget(0.0).part().seconds == 0.0
-
-
-def test_the_gate_fails_where_all_of_the_spread_is_too_low() -> None:
     expected = {"level": 1.0, "slower": 1.0, "unsure": 2.0}
     measured = {"level": [0.91, 0.95, 1.2], "slower": [0.8, 0.85, 0.89], "unsure": [1.0, 1.1, 2.9], "new": [0.1]}
     lines = {line[0]: (line[-1], failed) for line, failed in gate.judged(measured, expected)}
     assert lines == {"level": ("", False), "slower": ("fails", True), "unsure": ("", False), "new": ("", False)}
+    kept = json.loads(gate.KEPT.read_text(encoding="utf-8"))
+    assert len(gate.ROWS) == 10
+    assert all(list(level["ratios"]) == list(gate.ROWS) for level in kept.values())
 
 
 @pytest.mark.parametrize("slower", [1, 3])
@@ -387,12 +366,6 @@ def test_the_gate_ends_with_what_it_found(slower: int, tmp_path: Path, monkeypat
     assert gate.main([]) == (slower > 1)
     assert "| a row | " in (tmp_path / "summary.md").read_text(encoding="utf-8")
     assert gate.main(["--keep"]) == 0
-
-
-def test_the_gate_has_ten_rows_and_knows_what_to_expect() -> None:
-    kept = json.loads(gate.KEPT.read_text(encoding="utf-8"))
-    assert len(gate.ROWS) == 10
-    assert all(list(level["ratios"]) == list(gate.ROWS) for level in kept.values())
 
 
 def test_pictures_are_drawn_of_what_was_measured(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -3,8 +3,6 @@
 What was tried and how often is in docs/developing/reliability.md.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import signal
@@ -34,10 +32,8 @@ CORPUS: list[dict[str, Any]] = json.loads((ROOT / "tests" / "campaign" / "corpus
 
 
 def alone(expression: str) -> str:
-    """What an expression over the campaigns comes to, in a process of its own.
-
-    That of the tests may be large, so that a leak is not seen, and may have threads that a fork does not survive, such as JAX's.
-    """
+    """What an expression over the campaigns comes to, in a process of its own."""
+    # That of the tests may be large, which hides a leak, and may have threads that a fork does not survive, such as JAX's.
     words = [sys.executable, "-c", f"from campaign import memory, processes; print({expression})"]
     paths = os.pathsep.join([str(ROOT / "tests"), *sys.path])
     process = subprocess.run(words, env=os.environ | {"PYTHONPATH": paths}, capture_output=True, text=True, timeout=300)
@@ -52,9 +48,6 @@ def _quiet() -> Iterator[None]:
         oracle.quiet()
         yield
     sys.set_int_max_str_digits(digits)  # other tests want Python's own
-
-
-# ---- fuzzed calls
 
 
 @timer
@@ -132,9 +125,6 @@ def test_a_call_that_ends_its_process_is_named(tmp_path: Path, monkeypatch: pyte
     assert changed["omega"] == ["float", (7.0).hex()]
 
 
-# ---- memory
-
-
 @LINUX
 @pytest.mark.parametrize("kind", ["one member", "adaptive", "worlds", "new systems", "refused"])
 def test_memory_is_steady(kind: str) -> None:
@@ -151,9 +141,6 @@ def test_a_leak_is_noticed() -> None:
     assert "files" in alone(keeping.format(20, "open('/dev/null')"))
 
 
-# ---- threads
-
-
 @pytest.mark.filterwarnings("ignore::stepwell.DivergenceWarning", "ignore::stepwell.AccuracyWarning")
 @pytest.mark.parametrize("check", threads.CHECKS, ids=lambda check: check.__name__)
 def test_threads_that_share_things_get_the_bits_of_one(check: Any) -> None:
@@ -165,9 +152,6 @@ def test_threads_that_share_things_get_the_bits_of_one(check: Any) -> None:
         sys.setswitchinterval(interval)
 
 
-# ---- processes
-
-
 @LINUX
 @pytest.mark.parametrize("way", ["fork", "spawn"])
 def test_other_processes_have_the_same_bits(way: str) -> None:
@@ -175,12 +159,8 @@ def test_other_processes_have_the_same_bits(way: str) -> None:
 
 
 @LINUX
-def test_forks_while_threads_trace_and_step() -> None:
+def test_forks_while_threads_trace_compile_and_step() -> None:
     assert alone("processes.busy_forks(10)") == "10"
-
-
-@LINUX
-def test_forks_while_the_same_system_is_compiled() -> None:
     assert alone("processes.forks_amid_compiling(30)") == "30"
 
 
@@ -190,9 +170,6 @@ def test_a_writer_that_is_killed_leaves_a_whole_run(ending: str) -> None:
     if ending == ".zarr":
         pytest.importorskip("zarr")
     assert processes.killed_writers(3, ending) == 3
-
-
-# ---- disks
 
 
 @LINUX

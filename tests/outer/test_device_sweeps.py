@@ -1,7 +1,5 @@
 """Sweeps whose members a device steps, computing outcomes meanwhile: the bits of the CPU, and no history crosses the bus."""
 
-from __future__ import annotations
-
 import itertools
 import warnings
 from typing import Any
@@ -232,9 +230,21 @@ def test_a_tolerance_in_shares_and_launches(monkeypatch: Any) -> None:
     assert_alike(cpu, sw.sweep(driven, MU, "merson", device="opencl", chunk=9, threads=3, **options))
 
 
-def test_with_a_tolerance_quantities_are_seen_here() -> None:
+def test_what_is_seen_here() -> None:
     options: dict[str, Any] = {"v": 0.3, "tolerance": 1e-7, "at": np.linspace(0.0, 5.0, 40), "outcomes": ["mean", E("energy")]}
     assert_alike(*both(sw.Oscillator, OMEGA, "merson", **options))
+    rng = np.random.default_rng(4)
+    options: dict[str, Any] = {"v": rng.normal(size=(64, 2)), "y": rng.normal(size=(64, 2)), "dt": 0.001, "steps": 3}
+
+    def many(strength: float) -> sw.NBody:
+        return sw.NBody(np.ones(64), G=strength, softening=0.1)
+
+    axes = {"strength": ("strength", [0.5, 1.0])}
+    cpu, device = both(many, axes, "leapfrog", outcomes=["extremes", "mean"], **options)
+    assert_alike(cpu, device)
+    # As of ``np.minimum``; the text is that of C.
+    lines = "\n".join(Observer(1, (Extremes((0,)),), 1).see())
+    assert "if (q0 < o0 || q0 != q0) o0 = q0;" in lines
 
 
 #: The same rows, reduced otherwise: what is kept of a text in a process goes by both.
@@ -258,24 +268,6 @@ def test_outcomes_in_another_order(kind: str, orders: list[Any]) -> None:
         method, more = "merson", {"tolerance": 1e-6, "at": np.linspace(0.0, 2.0, 20)}
     for outcomes in orders:
         assert_alike(*both(sw.Oscillator, OMEGA, method, outcomes=outcomes, v=0.3, **more))
-
-
-def test_a_number_that_was_not_a_number_stays_one() -> None:
-    """As of ``np.minimum``; the text is that of C."""
-    lines = "\n".join(Observer(1, (Extremes((0,)),), 1).see())
-    assert "if (q0 < o0 || q0 != q0) o0 = q0;" in lines
-
-
-def test_many_bodies_are_seen_as_before() -> None:
-    rng = np.random.default_rng(4)
-    options: dict[str, Any] = {"v": rng.normal(size=(64, 2)), "y": rng.normal(size=(64, 2)), "dt": 0.001, "steps": 3}
-
-    def many(strength: float) -> sw.NBody:
-        return sw.NBody(np.ones(64), G=strength, softening=0.1)
-
-    axes = {"strength": ("strength", [0.5, 1.0])}
-    cpu, device = both(many, axes, "leapfrog", outcomes=["extremes", "mean"], **options)
-    assert_alike(cpu, device)
 
 
 #: Sweeps whose states come back, or members that stop; by a method with a carry, over a transient, an interval, an event.
@@ -312,15 +304,12 @@ def test_the_variable_names_the_device(monkeypatch: pytest.MonkeyPatch) -> None:
     assert seen == [NAMES[0], "cpu"]
 
 
-def test_a_store_goes_on_with_another_device(tmp_path: Any) -> None:
+def test_a_store_goes_on_with_another_device_but_no_wrong_one(tmp_path: Any) -> None:
     pytest.importorskip("zarr")
     options: dict[str, Any] = {"v": 0.0, "dt": 0.02, "steps": 20, "store": tmp_path / "results.zarr", "chunk": 10}
     one = sw.sweep(driven, MU, "rk4", **options)
     other = sw.sweep(driven, MU, "rk4", device="opencl", **options)
     assert one.attrs["bits"] == other.attrs["bits"]
-
-
-def test_a_wrong_device() -> None:
     with pytest.raises(ArgumentError, match="device: expected 'cpu', 'opencl'"):
         sw.sweep(driven, MU, "rk4", v=0.0, dt=0.02, steps=20, device="gpu")
     with pytest.raises(UnsupportedError, match="device: there is no opencl:99"):

@@ -1,7 +1,5 @@
 """The benchmark of ensembles: contestants find what is right, and the share of right outcomes tells if one does not."""
 
-from __future__ import annotations
-
 import importlib
 import json
 from pathlib import Path
@@ -58,7 +56,7 @@ def test_a_wrong_one_is_told_of(name: str, monkeypatch: pytest.MonkeyPatch) -> N
     assert share(name, "stepwell", right) < LEAST[name]
 
 
-def test_right_is_counted_among_what_is_known() -> None:
+def test_right_is_counted_among_what_is_known_and_lines_among_code() -> None:
     outcomes, right = np.array([0, 1, 2, 2]), np.array([0, 1, 1, 2])
     assert truth.right("basins", outcomes, right, np.array([True, True, True, False])) == pytest.approx(2 / 3)
     never = np.array([np.nan, 1.0, np.nan, 5.0])
@@ -66,9 +64,6 @@ def test_right_is_counted_among_what_is_known() -> None:
     states = np.zeros((2, 3))
     off = states + np.array([[0.0], [0.01]])
     assert truth.right("bifurcation", states, off, np.ones(2, dtype=bool)) == 0.5
-
-
-def test_lines_are_those_of_code() -> None:
     counted = {each: ensembles.lines(each, "basins") for each in ensembles.CONTESTANTS}
     assert 10 < counted["stepwell"] < counted["numba"]
     text = (ensembles.HERE / "stepwell_basins.py").read_text(encoding="utf-8")

@@ -10,17 +10,12 @@ import pytest
 import stepwell as sw
 from support.abroad import bits
 from support.browser import needs_browser
-from support.explored import STEPS, expected, page, scene_of
+from support.explored import STEPS, expected, page, scene_of, the_file  # noqa: F401
 
 pytestmark = needs_browser
 
 #: Milliseconds that the page may take to show something on a busy machine.
 PATIENCE = 20_000
-
-
-@pytest.fixture(scope="module")
-def file(tmp_path_factory: pytest.TempPathFactory) -> str:
-    return page().save(tmp_path_factory.mktemp("page") / "explorer.html").as_uri()
 
 
 class Shown:
@@ -94,22 +89,32 @@ def test_it_plays_and_its_link_restores_the_state(browser: Any, file: str) -> No
         assert not shown.complaints
     with Shown(browser, file, "#" + link.partition("#")[2]) as again:
         assert again.at("playing") is False
-        assert again.at("race.k") == k
-        assert again.states() == states
+        assert (again.at("race.k"), again.states()) == (k, states)
         assert (again.at("dt"), again.at("speed"), again.at("phase"), again.at("values.start")) == (0.0123, 1, 2, 0.95)
         assert again.page.locator("#method-a").input_value() == "leapfrog"
         assert not again.complaints
 
 
-def test_nonsense_in_a_link_is_left_out(browser: Any, file: str) -> None:
+def test_nonsense_in_a_link_is_left_out_and_a_blow_up_said(browser: Any, file: str) -> None:
     words = "#scene=nothing&a=rk5&b=&dt=-1&speed=1e9&phase=-3&p.m1=x&at=1e99&more=%3Cb%3E"
     with Shown(browser, file, words + "&play=0") as shown:
-        assert shown.at("scene.name") == "clover"
-        assert shown.at("keys") == ["false_euler", "rk4"]
+        assert (shown.at("scene.name"), shown.at("keys")) == ("clover", ["false_euler", "rk4"])
         assert shown.at("dt") > 0
-        assert shown.at("values.m1") == 1
-        assert shown.at("phase") == 0
+        assert (shown.at("values.m1"), shown.at("phase")) == (1, 0)
         assert not shown.complaints
+    with Shown(browser, file, "#scene=oscillator&a=false_euler&b=rk4&dt=2.5&at=900&play=0") as shown:
+        with pytest.warns(sw.DivergenceWarning):
+            run = sw.integrate(sw.Oscillator(), "false_euler", v=0.0, y=1.0, dt=2.5, steps=900)
+        assert shown.text("lost-a").startswith(f"Blew up: after step {run.first_bad_step} ")
+        assert shown.text("lost-b") == ""
+        assert "False Euler: Blew up" in shown.page.locator("#news").text_content()
+        assert not shown.complaints
+    with Shown(browser, file, "", reduced_motion="reduce") as shown:
+        assert shown.at("playing") is False
+        shown.page.locator("#play").click()
+        assert shown.at("playing") is True
+    with Shown(browser, file) as shown:
+        assert shown.at("playing") is True
 
 
 def test_controls_by_hand(browser: Any, file: str) -> None:
@@ -152,16 +157,6 @@ def test_the_limit_under_damping_is_that_of_stability_limit(browser: Any, file: 
                 assert limit == pytest.approx(float(sw.stability_limit(system, key)), rel=1e-9)
 
 
-def test_a_blow_up_is_said_with_its_step(browser: Any, file: str) -> None:
-    with Shown(browser, file, "#scene=oscillator&a=false_euler&b=rk4&dt=2.5&at=900&play=0") as shown:
-        with pytest.warns(sw.DivergenceWarning):
-            run = sw.integrate(sw.Oscillator(), "false_euler", v=0.0, y=1.0, dt=2.5, steps=900)
-        assert shown.text("lost-a").startswith(f"Blew up: after step {run.first_bad_step} ")
-        assert shown.text("lost-b") == ""
-        assert "False Euler: Blew up" in shown.page.locator("#news").text_content()
-        assert not shown.complaints
-
-
 @pytest.mark.parametrize(("width", "scheme"), [(360, "light"), (360, "dark"), (768, "light"), (1280, "dark")])
 def test_nothing_is_cut_off(browser: Any, file: str, width: int, scheme: str) -> None:
     window = {"viewport": {"width": width, "height": 780}, "color_scheme": scheme, "has_touch": width == 360}
@@ -169,7 +164,6 @@ def test_nothing_is_cut_off(browser: Any, file: str, width: int, scheme: str) ->
         assert shown.page.evaluate("document.documentElement.scrollWidth") <= width
         for node in shown.page.locator("select, button, input, canvas, summary").all():
             box = node.bounding_box()
-            assert box is not None
             assert box["width"] > 20
             assert box["height"] >= 20, node.evaluate("each => each.id")  # what a finger can meet
             assert box["x"] >= 0
@@ -202,15 +196,6 @@ def test_every_control_has_a_name_and_a_visible_focus(browser: Any, file: str) -
             assert focused[1] == "solid", focused
         wanted = "scene play one reset speed dt link method-a method-b m1 m2 m3 soft phase"
         assert set(wanted.split()) <= seen
-
-
-def test_reduced_motion_waits_for_a_key(browser: Any, file: str) -> None:
-    with Shown(browser, file, "", reduced_motion="reduce") as shown:
-        assert shown.at("playing") is False
-        shown.page.locator("#play").click()
-        assert shown.at("playing") is True
-    with Shown(browser, file) as shown:
-        assert shown.at("playing") is True
 
 
 def test_a_frame_of_the_clover_takes_a_fraction_of_its_time(browser: Any, file: str) -> None:

@@ -1,7 +1,5 @@
 """What the explorer's page shows at first sight: findings that are true, red where it is meant, texts that can be read."""
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Callable
 from functools import cache
@@ -15,13 +13,11 @@ from stepwell.scenes.truth import with_truth
 from stepwell.views.explorer import sliders
 from stepwell.views.explorer.data import of_scene
 from support.browser import needs_browser
-from support.explored import data_of, in_node, needs_node, page, scene_of
+from support.explored import data_of, in_node, needs_node, page, scene_of, the_file  # noqa: F401
 from support.families import family
 
 #: Scenes of whose motion or steps there is most to do: by far the longest texts, several bodies, a rope of many points.
 HEAVIEST = ("rope", "energy_control", "figure_eight", "pythagorean", "clover")
-
-# ---- the finding of each scene
 
 
 @cache
@@ -103,9 +99,6 @@ FINDINGS: dict[str, Callable[[Any, Any, Any, Any], bool]] = {
 def test_what_a_scene_says_at_first_is_true() -> None:
     wrong = [name for name, holds in FINDINGS.items() if not (data_of(name)["finding"] and holds(*runs(name)))]
     assert not wrong
-
-
-def test_every_scene_has_its_own_pair() -> None:
     assert set(FINDINGS) == set(sliders.OFFERS)
     for data in page().data["scenes"]:
         assert set(data["pair"]) <= set(data["steps"]), data["name"]
@@ -113,9 +106,6 @@ def test_every_scene_has_its_own_pair() -> None:
         for key in data["pair"]:
             names = {sw.method(key).title.split()[0], key.upper()}
             assert any(name in data["finding"] for name in names), (data["name"], key)
-
-
-def test_a_stiff_scene_has_a_truth_by_an_implicit_method() -> None:
     assert [data_of(name)["truth_by"] for name in ("van_der_pol", "rober", "clover")] == ["rodas5p", "rodas4", "dop853"]
     own = of_scene(sw.scenes.oregonator(), sw.methods())
     assert own["truth_by"] in ("rodas4", "rodas5p")
@@ -145,9 +135,6 @@ told = given.map(([name, steps]) => {
         scale = max(data_of(name)["scales"])
         assert np.abs(np.array(got) - true).max() < 1e-6 * scale
         assert gap < 1e-6
-
-
-# ---- the ellipse of a step
 
 
 @needs_node
@@ -182,9 +169,6 @@ told = given.map(([name, key, dt]) => {
     assert results[1][1] == "v² − 0.3·v·y + y² = 1"
 
 
-# ---- red roots
-
-
 @needs_node
 def test_a_root_is_red_only_where_the_method_is_unstable(tmp_path: Path) -> None:
     """Not where the true motion grows itself, and not at a state of a motion that is not linear."""
@@ -203,14 +187,6 @@ told = given.map(([roots, trueRoots, linear]) => {
         cases,
     )
     assert results == [True, False, False, False, True]
-
-
-# ---- in the browser
-
-
-@pytest.fixture(scope="module")
-def file(tmp_path_factory: pytest.TempPathFactory) -> str:
-    return page().save(tmp_path_factory.mktemp("look") / "explorer.html").as_uri()
 
 
 @pytest.fixture
@@ -268,12 +244,33 @@ def test_a_scene_brings_its_pair_unless_a_user_chose(shown: Any, file: str) -> N
 
 
 @needs_browser
-def test_no_panel_is_empty(shown: Any, file: str) -> None:
+def test_panels_are_filled(shown: Any, file: str) -> None:
     """Where the page has no energy, a number of the state is in its place."""
     for name in ("van_der_pol", "oscillator"):
         opened(shown, file, f"#scene={name}&at=60&play=0")
         assert shown.locator("#watched").inner_text() == ("Energy" if name == "oscillator" else "y over time")
         assert shown.evaluate("explorer.page.race.energies[1].every(Number.isFinite)")
+    # The strip below the oscillator's block reaches the end of the picture: something is drawn in every fifth of its height.
+    opened(shown, file, "#scene=oscillator&at=60&play=0")
+    inked = shown.evaluate(
+        """() => {
+          const canvas = document.getElementById("motion-b");
+          const { width, height } = canvas;
+          const pixels = canvas.getContext("2d").getImageData(0, 0, width, height).data;
+          return [0, 1, 2, 3, 4].map((fifth) => {
+            let [low, high] = [width, 0];
+            for (let y = Math.floor((fifth * height) / 5); y < ((fifth + 1) * height) / 5; y++)
+              for (let x = 0; x < width; x++)
+                if (pixels[4 * (y * width + x) + 3] > 128) [low, high] = [Math.min(low, x), Math.max(high, x)];
+            return high - low;
+          });
+        }"""
+    )
+    assert min(inked) > 60
+    opened(shown, file, "#scene=oscillator&at=40&play=0")
+    assert "stays on the ellipse v² − 0.3·v·y + y² = 1" in shown.locator("#phase-told-b").inner_text()
+    grown, stays = shown.evaluate("explorer.page.zooms")
+    assert stays < 1.5 < 3 < grown
 
 
 CONTRAST = """(names) => {
@@ -328,27 +325,6 @@ def test_the_ring_of_the_focus_covers_no_label(shown: Any, file: str) -> None:
         assert ring >= 0, name
 
 
-@needs_browser
-def test_the_block_fills_its_box(shown: Any, file: str) -> None:
-    """The strip below the oscillator's block reaches the end of the picture: something is drawn in every fifth of its height."""
-    opened(shown, file, "#scene=oscillator&at=60&play=0")
-    inked = shown.evaluate(
-        """() => {
-          const canvas = document.getElementById("motion-b");
-          const { width, height } = canvas;
-          const pixels = canvas.getContext("2d").getImageData(0, 0, width, height).data;
-          return [0, 1, 2, 3, 4].map((fifth) => {
-            let [low, high] = [width, 0];
-            for (let y = Math.floor((fifth * height) / 5); y < ((fifth + 1) * height) / 5; y++)
-              for (let x = 0; x < width; x++)
-                if (pixels[4 * (y * width + x) + 3] > 128) [low, high] = [Math.min(low, x), Math.max(high, x)];
-            return high - low;
-          });
-        }"""
-    )
-    assert min(inked) > 60
-
-
 @pytest.mark.parametrize(
     "heaviest", family([True, False], lambda heaviest: heaviest, lambda heaviest: "heaviest" if heaviest else "others")
 )
@@ -370,11 +346,3 @@ def test_frames_of_scenes_leave_half_of_their_time(heaviest: bool, shown: Any, f
         if frames[len(frames) // 2] >= 8.4:
             slow[data["name"]] = frames[len(frames) // 2]
     assert not slow
-
-
-@needs_browser
-def test_what_grows_does_not_hide_the_ellipse_of_the_other(shown: Any, file: str) -> None:
-    opened(shown, file, "#scene=oscillator&at=40&play=0")
-    assert "stays on the ellipse v² − 0.3·v·y + y² = 1" in shown.locator("#phase-told-b").inner_text()
-    grown, stays = shown.evaluate("explorer.page.zooms")
-    assert stays < 1.5 < 3 < grown

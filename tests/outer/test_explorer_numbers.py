@@ -1,7 +1,5 @@
 """The explorer's own arithmetic in Node: roots, limits, energies, exact solutions; each with mistakes that must be noticed."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 
@@ -12,10 +10,9 @@ from stepwell.views.explorer import sliders
 from stepwell.views.explorer.data import of_scene
 from support.explored import data_of, in_node, needs_node, scene_of
 
-# ---- roots
+pytestmark = needs_node
 
 
-@needs_node
 def test_eigenvalues_are_those_of_numpy(tmp_path: Path) -> None:
     """QR steps are backward stable: eigenvalues of a matrix that differs by some n·eps of its norm, times their condition."""
     rng = np.random.default_rng(5)
@@ -48,7 +45,6 @@ def nearest(roots: list[dict[str, float]], wanted: Any) -> float:
     return most
 
 
-@needs_node
 def test_roots_of_linear_scenes_are_those_of_analyse(tmp_path: Path) -> None:
     """Columns of P are steps of unit vectors, right to some roundings; a double root moves by the square root of these."""
     oscillators = [("oscillator", m.name, dt, {}, 3) for m in sw.methods() for dt in (0.3, 1.9, 3.0)]
@@ -67,12 +63,9 @@ def test_roots_of_linear_scenes_are_those_of_analyse(tmp_path: Path) -> None:
             assert nearest(got, wanted) < 1e-13 * size, (name, key, dt)
 
 
-@needs_node
 def test_roots_at_a_state_are_those_of_analyse(tmp_path: Path) -> None:
-    """Central differences by 6e-6 of the size: the third derivative's part and rounding are some 1e-10 of a derivative.
-
-    The roots of the clover come in multiples, which an error e moves by its square root, here 1e-5.
-    """
+    """Central differences by 6e-6 of the size: the third derivative's part and rounding are some 1e-10 of a derivative."""
+    # The roots of the clover come in multiples, which an error e moves by its square root, here 1e-5.
     every = [("pendulum", key, 0.3, {"start": 1.0}, 0) for key in ("false_euler", "rk4", "standard_heun")]
     every += [("clover", key, 0.1, {}, 0) for key in ("false_euler", "rk4")]
     results = in_node(ROOTS, tmp_path, every)
@@ -83,10 +76,8 @@ def test_roots_at_a_state_are_those_of_analyse(tmp_path: Path) -> None:
 
 
 @pytest.mark.mutant
-@needs_node
 @pytest.mark.parametrize(
-    ("module", "right", "mistake"),
-    [("roots", "larger === 0 ? 0 : q / larger", "p + larger"), ("roots", "(a + d) / 2", "a + d")],
+    ("module", "right", "mistake"), [("roots", "larger === 0 ? 0 : q / larger", "p + larger"), ("roots", "(a + d) / 2", "a + d")]
 )
 def test_wrong_roots_are_noticed(module: str, right: str, mistake: str, tmp_path: Path) -> None:
     every = [("oscillator", "false_euler", 3.0, {}, 3)]
@@ -94,7 +85,6 @@ def test_wrong_roots_are_noticed(module: str, right: str, mistake: str, tmp_path
     assert nearest(got, sw.analyse(sw.Oscillator(), "false_euler", dt=3.0).eigenvalues) > 1e-3
 
 
-@needs_node
 def test_limits_are_those_of_stability_limit(tmp_path: Path) -> None:
     """By a method's own limit and the fastest mode; with damping by bisection, to some roundings of p and q over their slope."""
     cases = {
@@ -118,9 +108,6 @@ told = given.map(([name, key, values, limit]) => {
         assert got == pytest.approx(float(sw.stability_limit(system, key)), rel=1e-9), (name, key)
 
 
-# ---- energies and exact solutions
-
-
 ENERGY = "told = given.map(([name, v, y]) => ENERGIES[scene(name).energy.kind](scene(name).energy, v, y));"
 
 
@@ -139,7 +126,6 @@ def energies(folder: Path, change: Any = None) -> list[tuple[str, float, float]]
     return [(name, x, float(scene_of(name).system.energy(v, y))) for (name, v, y), x in zip(every, got, strict=True)]
 
 
-@needs_node
 def test_energies_are_those_of_the_systems(tmp_path: Path) -> None:
     """Sums of fewer than a hundred products that differ in their order only: a hundred roundings of terms of some size 100."""
     for name, got, wanted in energies(tmp_path):
@@ -184,7 +170,6 @@ SLID: list[tuple[sw.Scene, dict[str, float], sw.System]] = [
 ]
 
 
-@needs_node
 @pytest.mark.parametrize("forgotten", [pytest.param(False, id="as they are"), pytest.param(True, id="a mistake")])
 def test_sliders_of_any_step_move_its_energy_too(forgotten: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Sums of a few products. With links forgotten, the mistake, no energy is right but that of a canonical form."""
@@ -215,7 +200,6 @@ told = given.map(([scene, values, v, y]) => ENERGIES[scene.energy.kind](settings
 
 
 @pytest.mark.mutant
-@needs_node
 @pytest.mark.parametrize(
     ("right", "mistake", "scenes"),
     [
@@ -266,7 +250,6 @@ def truths(folder: Path, change: Any = None) -> dict[str, float]:
     return most
 
 
-@needs_node
 def test_formulas_of_the_motion_are_those_of_the_scenes(tmp_path: Path) -> None:
     """Values of some 5 at times of some 60: a rounding of the time alone is worth 60·5·2⁻⁵³, and there are some dozens."""
     most = truths(tmp_path)
@@ -275,7 +258,6 @@ def test_formulas_of_the_motion_are_those_of_the_scenes(tmp_path: Path) -> None:
 
 
 @pytest.mark.mutant
-@needs_node
 @pytest.mark.parametrize(
     ("right", "mistake", "scene"),
     [
@@ -290,12 +272,9 @@ def test_wrong_formulas_are_noticed(right: str, mistake: str, scene: str, tmp_pa
     assert {name for name, error in most.items() if error > 1e-3} == {scene}
 
 
-@needs_node
 def test_a_run_with_small_steps_is_the_truth(tmp_path: Path) -> None:
-    """Where there is an exact solution the page's own is as near as it claims; in chaos it says until when it is known.
-
-    The two runs agree to 1e-6 in the scene's scales, so the finer one, of order 8, is nearer than that.
-    """
+    """Where there is an exact solution the page's own is as near as it claims; in chaos it says until when it is known."""
+    # The two runs agree to 1e-6 in the scene's scales, so the finer one, of order 8, is nearer than that.
     names = ["clover", "kepler", "chain", "pendulum", "conical_pendulum", "dzhanibekov", "figure_eight", "arenstorf"]
     results = in_node(
         """
@@ -319,7 +298,6 @@ told = given.map((name) => {
         assert apart < 1e-6, (name, apart)
 
 
-@needs_node
 def test_the_true_motion_is_known_for_a_time_only_in_chaos(tmp_path: Path) -> None:
     """Two runs of the double pendulum with other steps part; the errors that are shown end there."""
     untils = in_node(

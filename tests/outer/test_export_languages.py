@@ -1,7 +1,5 @@
 """Exported steps in every language: the bits of ``integrate``, the programs that heads and pages show, and what is refused."""
 
-from __future__ import annotations
-
 import math
 import re
 from pathlib import Path
@@ -74,9 +72,6 @@ def test_a_wrong_operation_is_noticed(language: str, tmp_path: Path) -> None:
 def test_parameters_may_be_called_anything(language: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     every = oddly_named(monkeypatch)
     assert_same(every, run(language, every, tmp_path))
-
-
-# ---- programs that are shown
 
 
 @languages

@@ -1,7 +1,5 @@
 """The site: it builds from a copy of the tree without a network or a warning, and its pages work in a browser, on a phone too."""
 
-from __future__ import annotations
-
 import html
 import inspect
 import json
@@ -105,15 +103,29 @@ def from_the_web(site: Path) -> list[str]:
     return addresses
 
 
-def test_nothing_is_loaded_from_the_web(site: Path) -> None:
+def test_pages_load_nothing_from_the_web_and_lead_somewhere(site: Path) -> None:
     assert not from_the_web(site)
+    # The button at the end of a page leads to its start, which has no name.
+    assert not [each for each in lost(site) if not each.endswith(": #")]
+    pages = list(site.rglob("*.html"))
+    assert [path.name for path in pages if re.search(r"Text\(0?\.\d", path.read_text(encoding="utf-8"))] == []
+    # What a search engine shows, and what a link becomes elsewhere.
+    for path in (site / "index.html", site / "howto" / "runs.html", site / "gallery" / "motion" / "heavy_top.html"):
+        text = path.read_text(encoding="utf-8")
+        for needed in ('name="description" content="Fast, reproducible', 'property="og:title"', "favicon.svg"):
+            assert needed in text, (path.name, needed)
 
 
-def test_what_is_loaded_from_the_web_is_found(tmp_path: Path) -> None:
+def test_what_is_loaded_from_the_web_and_a_lost_link_are_found(tmp_path: Path) -> None:
     frame = html.escape('<img src="https://example.org/a.png">')
     (tmp_path / "a.html").write_text(f'<script src="//cdn.example.org/x.js"></script><iframe srcdoc="{frame}"></iframe>')
     (tmp_path / "a.css").write_text('@import "https://example.org/font.css"; p { background: url(data:x) }')
     assert len(from_the_web(tmp_path)) == 3
+    links = "b.html", "#here", "#there", "http://example.org", "https://example", "a.html#here", "https://example.org/x"
+    folder = tmp_path / "links"
+    folder.mkdir()
+    (folder / "a.html").write_text('<p id="here">' + "".join(f'<a href="{link}">' for link in links))
+    assert [each.partition(": ")[2] for each in lost(folder)] == ["b.html", "#there", "http://example.org", "https://example"]
 
 
 def lost(site: Path) -> list[str]:
@@ -135,17 +147,6 @@ def lost(site: Path) -> list[str]:
             if not good:
                 broken.append(f"{path.relative_to(site)}: {link}")
     return broken
-
-
-def test_links_lead_somewhere(site: Path) -> None:
-    # The button at the end of a page leads to its start, which has no name.
-    assert not [each for each in lost(site) if not each.endswith(": #")]
-
-
-def test_a_lost_link_is_found(tmp_path: Path) -> None:
-    links = "b.html", "#here", "#there", "http://example.org", "https://example", "a.html#here", "https://example.org/x"
-    (tmp_path / "a.html").write_text('<p id="here">' + "".join(f'<a href="{link}">' for link in links))
-    assert [each.partition(": ")[2] for each in lost(tmp_path)] == ["b.html", "#there", "http://example.org", "https://example"]
 
 
 def thumbnails(site: Path) -> list[Path]:
@@ -183,16 +184,6 @@ def test_a_gallery_page_says_what_it_shows() -> None:
         assert 40 < len(" ".join(description)) < 600, script.name
 
 
-def test_every_tutorial_ends_in_a_picture_or_an_animation(site: Path) -> None:
-    for name in TUTORIALS:
-        page = read(site / "tutorials" / f"{name}.html")
-        drawn = [load for load in page.loads if "_images/" in load]
-        assert drawn or page.frames, name
-        text = (site / "tutorials" / f"{name}.html").read_text(encoding="utf-8")
-        assert "output stderr" not in text, f"{name} shows a warning"
-        assert f"tutorials/{name}.html" in "".join(read(site / "index.html").links), "it is in the navigation"
-
-
 def documented(site: Path) -> set[str]:
     """The names of the reference."""
     inventory = (site / "objects.inv").read_bytes().split(b"\n", 4)[4]
@@ -209,9 +200,6 @@ def test_every_public_name_is_in_the_reference_with_an_example(site: Path) -> No
                 assert {f"{module.__name__}.{name}", f"stepwell.{name}"} & known, f"{module.__name__}.{name}"
     page = (site / "reference" / "runs.html").read_text(encoding="utf-8")
     assert "&gt;&gt;&gt; " in page
-
-
-# ---- in a browser
 
 
 SEEN = (
@@ -283,16 +271,14 @@ def test_a_tutorial_animates_and_the_search_finds(site: Path, browser: Any) -> N
     page.close()
 
 
-def test_every_page_has_a_card_and_an_icon(site: Path) -> None:
-    """What a search engine shows, and what a link becomes elsewhere."""
-    for path in (site / "index.html", site / "howto" / "runs.html", site / "gallery" / "motion" / "heavy_top.html"):
-        text = path.read_text(encoding="utf-8")
-        for needed in ('name="description" content="Fast, reproducible', 'property="og:title"', "favicon.svg"):
-            assert needed in text, (path.name, needed)
-
-
-def test_pictures_have_captions_and_texts(site: Path) -> None:
-    """Outside of the gallery, whose thumbnails have their names beside them, and of notebooks."""
+def test_pages_have_formulas_pictures_and_captions(site: Path) -> None:
+    text = re.sub(r"<[^>]*>", "", (site / "index.html").read_text(encoding="utf-8"))
+    assert "def duffing(" in text
+    assert "pip install" in text
+    text = (site / "theory" / "stability.html").read_text(encoding="utf-8")
+    assert text.count("<math ") > 4
+    assert "\\begin{pmatrix}" not in text
+    # Outside of the gallery, whose thumbnails have their names beside them, and of notebooks.
     for path in [site / "index.html", *site.glob("howto/*.html"), *site.glob("theory/*.html"), *site.glob("benchmarks/*.html")]:
         text = path.read_text(encoding="utf-8")
         images = re.findall(r"<img [^>]*src=\"[^\"]*_images/[^>]*>", text)
@@ -300,26 +286,13 @@ def test_pictures_have_captions_and_texts(site: Path) -> None:
         figures = re.findall(r"<figure.*?</figure>", text, re.DOTALL)
         assert all("<figcaption>" in figure for figure in figures), path.name
     assert "<figcaption>" in (site / "theory" / "stability.html").read_text(encoding="utf-8")
-
-
-def test_no_page_shows_what_a_title_returns(site: Path) -> None:
-    pages = list(site.rglob("*.html"))
-    assert [path.name for path in pages if re.search(r"Text\(0?\.\d", path.read_text(encoding="utf-8"))] == []
-
-
-def test_the_first_page_begins_with_an_equation(site: Path) -> None:
-    text = re.sub(r"<[^>]*>", "", (site / "index.html").read_text(encoding="utf-8"))
-    assert "def duffing(" in text
-    assert "pip install" in text
-
-
-def test_formulas_are_mathematics(site: Path) -> None:
-    text = (site / "theory" / "stability.html").read_text(encoding="utf-8")
-    assert text.count("<math ") > 4
-    assert "\\begin{pmatrix}" not in text
-
-
-# ---- the explorer
+    for name in TUTORIALS:
+        page = read(site / "tutorials" / f"{name}.html")
+        drawn = [load for load in page.loads if "_images/" in load]
+        assert drawn or page.frames, name
+        text = (site / "tutorials" / f"{name}.html").read_text(encoding="utf-8")
+        assert "output stderr" not in text, f"{name} shows a warning"
+        assert f"tutorials/{name}.html" in "".join(read(site / "index.html").links), "it is in the navigation"
 
 
 def states(site: Path) -> dict[str, list[str]]:

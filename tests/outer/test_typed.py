@@ -1,7 +1,5 @@
 """A type checker finds words that an argument does not take, and nothing in right calls."""
 
-from __future__ import annotations
-
 import re
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """The promise: Rust equals the NumPy reference to the last bit, on every CPU level, thread count and batch."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 from typing import Any
@@ -11,13 +9,13 @@ import pytest
 import stepwell as sw
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from stepwell.errors import UnsupportedError
 from support import ROOT, families
 from support.cases import SYSTEMS, Case, assert_same, cases, number, representative
 from support.families import family
-from support.ways import WAYS, assert_equal_ways, kernels
+from support.ways import WAYS, assert_equal_ways
 
 ALL = list(cases())
-DIRECT = [case for case in ALL if case.form == "direct"]
 
 #: Systems of several kinds of kernels, of which the ordinary run takes one case of each, and one of each method.
 FEW = ("free", "sampled x, sinusoid a", "pendulum, damped", "three bodies", "chain of five", "linear, two states", "own: Lorenz")
@@ -46,21 +44,6 @@ def test_every_case_in_every_way(case: Case) -> None:
         assert_equal_ways(system, ways=ways_of(case), **{"steps": 23, "every": 5, "t0": 0.3} | arguments | options)
 
 
-@pytest.mark.filterwarnings("ignore::stepwell.DivergenceWarning", "ignore::stepwell.AccuracyWarning")
-@pytest.mark.parametrize("case", sampled("machine code", direct=1, matrix=1))
-def test_machine_code_equals_the_interpreter(case: Case) -> None:
-    """By so many steps that machine code is written; saved at every step and at some; by several threads."""
-    for dtype in ("float64",) if case.refused_in_float32() else ("float64", "float32"):
-        for b, every, threads in ((1, 7, 1), (37, 1, 1), (300, 7, 3)):
-            runs = []
-            for level in sw.isa_levels():
-                with kernels(level):
-                    assert sw.isa() == level
-                    runs.append(case.run(b, steps=410, every=every, dtype=dtype, dt=0.02, threads=threads))
-            for run in runs[1:]:
-                assert_same(run, runs[0])
-
-
 @settings(max_examples=15, deadline=None)
 @given(
     case=st.sampled_from(ALL),
@@ -71,10 +54,18 @@ def test_machine_code_equals_the_interpreter(case: Case) -> None:
     start_step=st.integers(0, 10**9),
     every=st.sampled_from([None, 1, 2, 7]),
 )
-@pytest.mark.filterwarnings("ignore::stepwell.DivergenceWarning")
+@pytest.mark.filterwarnings("ignore::stepwell.DivergenceWarning", "ignore::stepwell.AccuracyWarning")
 def test_equals_the_reference_anywhere(case: Case, seed: int, b: int, **options: Any) -> None:
     options |= {"steps": 9}
-    assert_same(case.run(b, seed, **options), case.run(b, seed, **options, backend="numpy"))
+    try:
+        run = case.run(b, seed, **options)
+    except UnsupportedError as refused:  # steps so long that a bounce adds energy, by either backend
+        if "solves for the springs without the surfaces" not in str(refused):
+            raise
+        with pytest.raises(UnsupportedError, match=re.escape(str(refused))):
+            case.run(b, seed, **options, backend="numpy")
+        return
+    assert_same(run, case.run(b, seed, **options, backend="numpy"))
 
 
 @pytest.mark.parametrize("case", sampled("diverging members too", direct=1))

@@ -5,8 +5,6 @@ kernels are the ones that run: a batch as machine code against the same batch in
 on how fast the machine is.
 """
 
-from __future__ import annotations
-
 import time
 from typing import Any
 

@@ -1,8 +1,7 @@
 """Elementary functions of symbols: what stands on a tape makes the bits that arrays have."""
 
-from __future__ import annotations
-
 import itertools
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -13,8 +12,12 @@ from stepwell.errors import TraceError
 from stepwell.reference import functions as fn
 from stepwell.reference.tape.evaluate import Evaluation
 from stepwell.reference.tape.replay import Replay
-from support import symbols
+from stepwell.reference.traced import Tracer
+from stepwell.runs import engine
+from support.graphs import assert_one_graph
+from support.refusals import refused
 from support.true_functions import COMPARE, OF_ONE, OF_TWO, SPECIALS, TRUE, arguments, errors, same
+from support.ways import assert_equal_ways
 
 NAMES = [*OF_ONE, *OF_TWO]
 
@@ -33,16 +36,11 @@ def patterns(seed: int, n: int) -> np.ndarray:
 
 
 def test_the_tape_has_the_bits_of_arrays() -> None:
-    """And so has the second tape, in Python, which shortens nothing: no bit depends on what the core's does beforehand."""
     state = [patterns(1, 1000), patterns(2, 1000)]
     for name in NAMES:
-        f, numbers, tape, second = getattr(fn, name), state[: 2 if name in OF_TWO else 1], _core.Tape(), symbols.Tape()
-        symbol, other = (f(*map(each.state, range(len(numbers)))) for each in (tape, second))
+        f, numbers, tape = getattr(fn, name), state[: 2 if name in OF_TWO else 1], _core.Tape()
         with np.errstate(all="ignore"):
-            assert same(as_it_stands(tape, symbol, numbers), f(*numbers)).all(), name
-            leaves = {("state", i): each for i, each in enumerate(numbers)}
-            (values,) = symbols.evaluate(second, [other], leaves, lambda _, t: t)
-            assert same(np.broadcast_to(values, state[0].shape), f(*numbers)).all(), name
+            assert same(as_it_stands(tape, f(*map(tape.state, range(len(numbers)))), numbers), f(*numbers)).all(), name
 
 
 def test_a_number_beside_a_symbol_is_a_symbol() -> None:
@@ -108,13 +106,6 @@ def test_choices_and_arrays_of_symbols() -> None:
         assert fn.where(np.array([True, False]), both, 2.0)[0].id == a.id
 
 
-def test_sine_and_cosine_of_one_angle_share_their_work() -> None:
-    tape = _core.Tape()
-    x = tape.state(0)
-    one, both = (len(tape.operations(symbols)[0]) for symbols in ([fn.sin(x)], [fn.sin(x), fn.cos(x)]))
-    assert both - one < 10
-
-
 def test_fused_they_are_as_accurate() -> None:
     """Products that are exact stay so when they are fused, and the others lose a rounding."""
     for name in TRUE:
@@ -172,8 +163,7 @@ def test_what_interp_refuses() -> None:
         (lambda t: np.interp(t, np.array([0.0, 1.0]) * t, [1.0, 2.0]), "known numbers as the places xp"),
     ]
     for call, message in calls:
-        with pytest.raises(TraceError, match=message):
-            sw.integrate(pushed_by(call), "rk4", v=0.0, y=1.0, dt=0.1, steps=1)
+        refused(TraceError, message, sw.integrate, pushed_by(call), "rk4", v=0.0, y=1.0, dt=0.1, steps=1)
 
 
 def test_a_spline_of_another_package_is_told_from_ones_own_mistakes() -> None:
@@ -186,3 +176,89 @@ def test_a_spline_of_another_package_is_told_from_ones_own_mistakes() -> None:
 
     with pytest.raises(TraceError, match=r"used by scipy, .* sw\.Sampled\(values, interval, interpolation="):
         sw.integrate(own, "rk4", v=0.0, y=1.0, dt=0.1, steps=1)
+
+
+TAYLOR = sw.method("taylor")
+
+#: Rates rates_by y with a parameter p, which is a symbol on a tape and no series.
+OF_STATE_AND_PARAMETER: dict[str, Callable[[Any, Any], Any]] = {
+    "power": lambda y, p: y**p,
+    "exponent": lambda y, p: p**y,
+    "float_power": np.float_power,
+    "hypot": np.hypot,
+    "hypot rates_by a parameter first": lambda y, p: np.hypot(p, y),
+    "logaddexp": np.logaddexp,
+    "logaddexp rates_by a parameter first": lambda y, p: np.logaddexp(p, y),
+    "arctan2": np.arctan2,
+    "arctan2 rates_by a parameter first": lambda y, p: np.arctan2(p, y),
+    "mod": np.mod,
+    "remainder": np.remainder,
+    "%": lambda y, p: y % p,
+    "twice with different parameters": lambda y, p: np.hypot(y, p) - np.hypot(y, 2.0 * p),
+    "twice with zeros rates_by both signs": lambda y, p: np.arctan2(y, 0.0) - p * np.arctan2(y, -0.0),
+}
+
+
+def rates_by(name: str) -> sw.System:
+    @sw.system
+    def own(t: Any, v: Any, y: Any, *, p: Any = 1.7) -> Any:
+        return -OF_STATE_AND_PARAMETER[name](y, p)
+
+    return own(p=[1.2, 1.7])
+
+
+def test_series_of_two_arguments_are_one_graph() -> None:
+    for name in OF_STATE_AND_PARAMETER:
+        system, tape = rates_by(name).for_state_shapes(0.0, 0.0), _core.Tape()
+        for what, traced in (("step", Tracer(system, tape).step), ("attempt", Tracer(system, tape).attempt)):
+            model = engine.model(engine.Plan(system, TAYLOR, (), 0.1))
+            assert_one_graph(tape, tape.trace(model, what), traced(TAYLOR))
+
+
+@pytest.mark.parametrize("name", ["power", "hypot", "arctan2", "mod"])
+def test_everything_that_reads_a_step_of_such_a_series(name: str) -> None:
+    system = rates_by(name)
+    one = {"v": 0.0, "y": 0.9}
+    assert np.isfinite(sw.lyapunov(system, "taylor", **one, dt=0.01, steps=20).exponents).all()
+    assert sum(sw.explain(system, "taylor").computed.values()) > 0
+    assert "_step" in sw.export(system, "taylor", "c", dt=0.01, member=1).source
+    below = sw.Event(lambda t, v, y: y - 0.85, name="below")
+    run = sw.integrate(system, "taylor", **one, dt=0.01, steps=80, events=[below])
+    assert (run.events["below"].count >= 1).all()
+    assert np.shape(sw.stability_limit(system, "taylor", **one)) == (2,)
+
+
+# The bits of exponential functions at all their edges, on every level.
+#: Where e^x and its kind end, and where two factors take turns.
+EDGES = [0.0, 709.78, 709.79, 710.0, 800.0, 1e300, 708.4, 708.3, 745.1, 745.2, 746.0, 744.4, 1022.0, 1024.0, 1074.0, 1075.0, 0.25]
+
+
+def at_edges() -> np.ndarray:
+    rng = np.random.default_rng(6)
+    near = np.concatenate([[each, np.nextafter(each, 9e99), np.nextafter(each, -9e99)] for each in EDGES])
+    halves = (np.arange(-1080, 1030) + 0.5) * np.log(2.0)  # where n changes
+    some = [rng.uniform(-760.0, 720.0, 500), rng.uniform(-1.0, 1.0, 200), halves, np.nextafter(halves, 0.0)]
+    return np.concatenate([near, -near, *some])
+
+
+EXPONENTIALS: list[Callable[[Any], Any]] = [
+    np.exp, np.expm1, np.exp2, lambda y: np.exp(y) * np.expm1(-y), lambda y: np.where(y < 0.0, np.exp(y), -np.exp(y)),
+    # Fused, the last product and the sum are one operation: of one more and less, the logistic, next to what is subnormal and far
+    # from it, next to what is infinite, and beside zero.
+    lambda y: 1.0 + np.exp(y), lambda y: 1.0 - np.exp(y), lambda y: np.exp(y) - 1.0, lambda y: 1.0 / (1.0 + np.exp(-y)),
+    lambda y: np.exp(y) + 1e-320, lambda y: 1e-270 - np.exp(y), lambda y: np.exp(y) - 1.7e308, lambda y: np.exp(y) + 0.0 * y,
+    lambda y: 1.5**y, lambda y: np.tanh(y) + np.exp(-y),
+]  # fmt: skip
+
+
+def of_state(function: Any) -> sw.System:
+    return sw.system(lambda t, v, y: function(y))()
+
+
+@pytest.mark.filterwarnings("ignore::stepwell.DivergenceWarning")
+@pytest.mark.parametrize("fused", [False, True])
+def test_exponentials_at_their_edges_are_the_same_at_all_levels(fused: bool) -> None:
+    """Where an instruction multiplies by a power of two."""
+    for function, y in itertools.product(EXPONENTIALS, (at_edges(), np.array([-720.0]))):
+        ask: dict[str, Any] = {"v": np.zeros(y.shape), "y": y, "dt": 1.0, "steps": 1}
+        assert_equal_ways(of_state(function), "standard_euler", ways=("by the reference", "at each level"), fused=fused, **ask)

@@ -3,8 +3,6 @@
 Both write to one tape, on which equal operations stand once. So they are the same graph if they end in the same values of it.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np
@@ -18,10 +16,23 @@ from support import families, own_systems
 from support.cases import ADAPTIVE, SYSTEMS, drawn, fits
 from support.graphs import MANY, assert_one_graph, methods, model
 from support.own_methods import adams_bashforth_2
+from support.refusals import refused
 from support.tracing import ABLE, CONTROLS, METHODS, made
 
 #: Whether numbers are of float32, which does not work with series.
 SINGLE = pytest.mark.parametrize("single", [False, True], ids=["float64", "float32"])
+
+
+def assert_traced(system: sw.System, method: sw.Method, what: str = "step", single: bool = False) -> None:
+    tape = _core.Tape(single=single)
+    core = tape.trace(model(system, method, single=single), what)
+    assert_one_graph(tape, core, getattr(Tracer(system, tape), what)(method))
+
+
+def controlled(name: str, control: str) -> sw.System:
+    system, v, y = made(name)
+    with np.errstate(all="ignore"):
+        return system.controlled(CONTROLS[control], v, y, 1e-3)
 
 
 @SINGLE
@@ -31,37 +42,23 @@ def test_a_step(name: str, single: bool) -> None:
     system, _, _ = made(name)
     able = [method for method in methods(system) if not (single and method.has_series)]
     for method in drawn(able, 4 if single and not families.LONG else None, "float32", name):
-        tape = _core.Tape(single=single)
-        core = tape.trace(model(system, method, single=single), "step")
-        assert_one_graph(tape, core, Tracer(system, tape).step(method))
+        assert_traced(system, method, single=single)
+
+
+OF_BODIES = [name for name in SYSTEMS if "bod" in name and "restricted" not in name]
 
 
 @pytest.mark.parametrize("control", CONTROLS)
-@pytest.mark.parametrize("name", [name for name in SYSTEMS if "bod" in name and "restricted" not in name])
-def test_a_step_under_control(name: str, control: str) -> None:
-    system, v, y = made(name)
-    with np.errstate(all="ignore"):
-        system = system.controlled(CONTROLS[control], v, y, 1e-3)
-    for method in methods(system):
-        tape = _core.Tape()
-        assert_one_graph(tape, tape.trace(model(system, method), "step"), Tracer(system, tape).step(method))
-
-
-@pytest.mark.parametrize("control", CONTROLS)
-@pytest.mark.parametrize("name", [name for name in SYSTEMS if "bod" in name and "restricted" not in name])
-def test_an_attempt_and_a_step_of_pefrl_under_control(name: str, control: str) -> None:
+@pytest.mark.parametrize("name", OF_BODIES)
+def test_a_step_and_an_attempt_under_control(name: str, control: str) -> None:
     """A push needs the step of the attempt, a projection does not; by PEFRL the push comes after the step."""
-    system, v, y = made(name)
-    with np.errstate(all="ignore"):
-        system = system.controlled(CONTROLS[control], v, y, 1e-3)
+    system, pefrl = controlled(name, control), sw.method("pefrl")
+    for method in methods(system):
+        assert_traced(system, method)
     for method in ABLE[:1] if int(np.prod(system.v_shape)) > MANY else ABLE:
-        if not fits(system, method):
-            continue
-        tape = _core.Tape()
-        assert_one_graph(tape, tape.trace(model(system, method), "attempt"), Tracer(system, tape).attempt(method))
-    pefrl = sw.method("pefrl")
-    tape, system = _core.Tape(), system.stepped_by(pefrl)
-    assert_one_graph(tape, tape.trace(model(system, pefrl), "step"), Tracer(system, tape).step(pefrl))
+        if fits(system, method):
+            assert_traced(system, method, "attempt")
+    assert_traced(system.stepped_by(pefrl), pefrl)
 
 
 @pytest.mark.parametrize("projection", ["scaling", "nacozy", "energy"])
@@ -81,13 +78,12 @@ def test_an_attempt_backward_under_a_projection(projection: str) -> None:
 
 
 @pytest.mark.parametrize("control", [sw.Control("energy", 0.3), sw.Control("energy", 0.3, "printed"), sw.Projection("energy")])
-def test_an_attempt_under_a_control_of_an_invariant(control: Any) -> None:
+def test_an_attempt_and_the_start_under_a_control_of_an_invariant(control: Any) -> None:
     system = own_systems.pendulum().for_state_shapes().under(control, ())
     for method in ABLE:
-        if not fits(system, method):
-            continue
-        tape = _core.Tape()
-        assert_one_graph(tape, tape.trace(model(system, method), "attempt"), Tracer(system, tape).attempt(method))
+        if fits(system, method):
+            assert_traced(system, method, "attempt")
+    assert_traced(system, ABLE[0], "begin")
 
 
 @pytest.mark.parametrize("name", SYSTEMS)
@@ -122,17 +118,8 @@ def test_an_attempt(name: str, single: bool) -> None:
 @pytest.mark.parametrize("name", ADAPTIVE)
 def test_the_start_of_a_run_with_a_tolerance(name: str) -> None:
     """A control does not change the first step, and a series has it as that of the step before, too."""
-    system, _, _ = made(name)
     for method in (ABLE[0], sw.method("taylor")):
-        tape = _core.Tape()
-        assert_one_graph(tape, tape.trace(model(system, method), "begin"), Tracer(system, tape).begin(method))
-
-
-@pytest.mark.parametrize("control", [sw.Control("energy", 0.3), sw.Control("energy", 0.3, "printed"), sw.Projection("energy")])
-def test_the_start_under_a_control_of_an_invariant(control: Any) -> None:
-    system = own_systems.pendulum().for_state_shapes().under(control, ())
-    tape = _core.Tape()
-    assert_one_graph(tape, tape.trace(model(system, ABLE[0]), "begin"), Tracer(system, tape).begin(ABLE[0]))
+        assert_traced(made(name)[0], method, "begin")
 
 
 @pytest.mark.mutant
@@ -167,7 +154,5 @@ def test_a_difference_is_shown() -> None:
 
 def test_symbols_cannot_be_branched_on() -> None:
     symbol = _core.Tape().state(0)
-    with pytest.raises(TypeError, match="no truth value"):
-        bool(symbol < 1.0)
-    with pytest.raises(TypeError, match="no truth value"):
-        float(symbol)
+    for wrong in (lambda: bool(symbol < 1.0), lambda: 1.0 if symbol else 0.0, lambda: symbol == symbol, lambda: float(symbol)):
+        refused(TypeError, "no truth value", wrong)

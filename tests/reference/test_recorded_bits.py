@@ -1,7 +1,5 @@
 """The bits of runs that were recorded with the core that was compiled ahead of time, kernel by kernel, are those of today."""
 
-from __future__ import annotations
-
 import pytest
 import stepwell as sw
 from support import recorded

@@ -1,7 +1,5 @@
 """1/r³ of r²: how right the core's root and division are, and the sequences without either that are kept for comparison."""
 
-from __future__ import annotations
-
 import decimal
 from collections.abc import Iterator
 from decimal import Decimal

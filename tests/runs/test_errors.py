@@ -1,6 +1,4 @@
-"""Bad input: a clear error before any work, tested by its text."""
-
-from __future__ import annotations
+"""Bad input, and what could be misread without a word: a clear error before any work, tested by its text."""
 
 import re
 import warnings
@@ -11,10 +9,17 @@ from typing import Any
 import numpy as np
 import pytest
 import stepwell as sw
-from stepwell import errors
+from stepwell import _core, errors
+from stepwell.runs import engine
+from support.refusals import refused
 
 FREE = sw.Oscillator(1.0)
 GOOD: dict[str, Any] = {"v": 0.0, "y": 1.0, "dt": 0.1, "steps": 10}
+
+
+@sw.system
+def turning(t: Any, v: Any, y: Any) -> Any:
+    return -y
 
 
 def run(system: Any = FREE, method: Any = "false_euler", **options: Any) -> sw.Run:
@@ -43,13 +48,55 @@ def _height(t: Any, v: Any, y: Any) -> Any:
     return y
 
 
+def paced(**options: Any) -> sw.Run:
+    return sw.integrate(FREE, "merson", **{"v": 0.0, "y": 1.0, "tolerance": 1e-3, "at": [1.0]} | options)
+
+
+second = sw.system(lambda t, v, y, *, k=1.0: -k * y)
+first = sw.system(order=1)(lambda t, y, *, k=1.0: -k * y)
+MASKED = np.ma.masked_array([1.0, 2.0, 3.0], [False, True, False])
+
+#: Arguments go by their place, so a swapped name would silently stand for another number.
+SWAPPED: list[tuple[Any, str]] = [
+    (lambda: sw.system(lambda t, y, v: -y), "f(t, v, y), got (t, y, v): y stands at the place of v"),
+    (lambda: sw.system(lambda t, x, v: -x), "f(t, v, y), got (t, x, v): v stands at the place of y"),
+    (lambda: sw.system(lambda v, y, t: -y), "f(t, v, y), got (v, y, t): v stands at the place of t"),
+    (lambda: sw.system(blocks=2)(lambda t, y, v: (-y, v)), "f(t, v, y), got (t, y, v)"),
+    (lambda: sw.system(order=1)(lambda y, t: -y), "f(t, y), got (y, t): y stands at the place of t"),
+    (lambda: sw.system(order=1)(lambda x, t: -x), "f(t, y), got (x, t): t stands at the place of y"),
+    (lambda: sw.system(order=1)(lambda v, y: -y), "f(t, y), got (v, y): v stands at the place of t"),
+    (lambda: run(events=sw.Event(lambda t, y, v: y, name="e")), "events: e: expected a function f(t, v, y), got (t, y, v)"),
+    (
+        lambda: run(events=sw.Event(lambda t, v, y: y, then=lambda t, y, v: (v, y), name="e")),
+        "events: e: then: expected a function f(t, v, y), got (t, y, v)",
+    ),
+    (lambda: second.invariant(lambda y, v: v * v + y * y), "f(v, y), got (y, v): y stands at the place of v"),
+    (lambda: second.invariant(lambda v, y, t: v * v + y * y), "f(t, v, y), got (v, y, t)"),
+    (lambda: first.invariant(lambda y, t: y * y), "f(t, y), got (y, t)"),
+    (lambda: second(k=lambda v: abs(v)), "k: expected a function f(t), got (v): v stands at the place of t"),
+    (lambda: sw.sweeps.Crossing(lambda v, y, t: y), "of: expected a function f(t, v, y), got (v, y, t)"),
+    (lambda: sw.solve_ivp(lambda y, t: -y, (0.0, 1.0), [1.0]), "fun: <lambda>: expected a function f(t, y), got (y, t)"),
+    (
+        lambda: sw.solve_ivp(lambda t, y: -y, (0.0, 1.0), [1.0], events=lambda y, t: y[0]),
+        "events: <lambda>: expected a function f(t, y), got (y, t)",
+    ),
+]
+
 #: Calls, and what their errors say, by the kind of error.
 BAD: dict[type[Exception], list[tuple[Callable[[], Any], str]]] = {
     errors.UnknownNameError: [
+        (lambda: run(t_span=(0.0, 1.0)), "t_span: integrate has no such argument; its start is t0="),
+        (lambda: run(args=(2.0,)), "args: integrate has no such argument; parameters are those of the system"),
+        (lambda: run(save_every=3), "save_every: integrate has no such argument; each so many steps are saved by every="),
+        (lambda: sw.orbits.system([1.0, 1e-3], P=1.0), "P: system has no such argument; the time of a revolution is period="),
         (lambda: run(method="fals_euler"), "method: there is no 'fals_euler'; did you mean 'false_euler'? Known: "),
+        (lambda: run(method="gillespie"), "method: gillespie is for stochastic simulation, which is not here"),
+        (lambda: run(method="IAS15"), "method: IAS15 is REBOUND's, and not here; take taylor or dop853 with tolerance="),
+        (lambda: run(method="kutta3"), "method: kutta3 is not here; write it as a function, stepwell.method"),
+        (lambda: sw.World(turning, "rk4", v=np.zeros(1), y=np.ones(1), dt=0.1).set(k=1.0), "there is no 'k'. Known: none."),
         (lambda: run(method=3), "method: there is no 3. Known: standard_euler, "),
         (lambda: sw.method("hune"), "did you mean 'standard_heun'?"),
-        (lambda: sw.method("RK45"), "RK45 is Dormand-Prince 5(4), which is not here; nearest, but not the same: fehlberg_5."),
+        (lambda: sw.method("Yoshida 4"), "Yoshida 4 is not here; nearest, but not the same: pefrl."),
         (lambda: sw.method("Störmer-Verlet"), "is the name of several methods: leapfrog, verlet"),
         (lambda: run(backend="nunpy"), "backend: there is no 'nunpy'; did you mean 'numpy'?"),
         (lambda: run(form="matrx"), "form: there is no 'matrx'; did you mean 'matrix'?"),
@@ -60,14 +107,23 @@ BAD: dict[type[Exception], list[tuple[Callable[[], Any], str]]] = {
         (lambda: run(record=["energy", 3]), "record: there is no 3. Known: energy."),
     ],
     errors.ArgumentError: [
-        (
-            lambda: run(method="merson", dt=None, steps=None, tolerance=1e-6),
-            "at: tolerance= needs the times at which to save states, too, such as at=[t1, t2]",
+        (lambda: run().select(None), "saved: expected an index of the saved states, got None"),
+        *SWAPPED,
+        *(
+            (lambda call=call: call(MASKED), "got a masked array in which 1 are masked")
+            for call in (sw.Oscillator, sw.NBody, lambda y: run(y=y), lambda y: world(y=y))
         ),
-        (
-            lambda: run(method="merson", dt=None, steps=None, at=[1.0]),
-            "tolerance: at= needs the error that a step may have, too, such as tolerance=1e-6",
+        (lambda: run(steps=np.ma.masked_array(3, True)), "steps: expected a whole number, got a masked one"),
+        *(
+            (lambda most=most: run(max_steps=most), "max_steps: works with tolerance= and at= only")
+            for most in ("junk", 5, 1_000_000)
         ),
+        *(
+            (lambda wrong=wrong: run(**wrong), "dt, t0: expected a time that moves on and stays finite")
+            for wrong in ({"t0": 1e300}, {"t0": 1e16, "dt": 1e-3}, {"dt": 1e308}, {"dt": 5e-324, "t0": 1.0})
+        ),
+        (lambda: paced(at=None), "at: tolerance= needs the times at which to save states, too, such as at=[t1, t2]"),
+        (lambda: paced(tolerance=None), "tolerance: at= needs the error that a step may have, too, such as tolerance=1e-6"),
         (lambda: run(start="first_order"), "start: false_euler starts in one way only, got 'first_order'"),
         (lambda: run(resume=run(), t0=1.0), "t0: the run that goes on has its own, got 1.0; to begin elsewhere,"),
         (lambda: sw.NBody(masses=[1, -2]), "masses: expected numbers of zero or more, got -2"),
@@ -111,11 +167,13 @@ BAD: dict[type[Exception], list[tuple[Callable[[], Any], str]]] = {
     errors.UnsupportedError: [
         (
             lambda: run(resume=run(y=[1.0, 2.0], steps=50, events=sw.Event(_height, terminal=True))),
-            "for each member i: v=run.v[-1][..., i], y=run.y[-1][..., i], t0=float(run.stopped_at[i])",
+            "resume: 2 of 2 members stopped at an event, at times of their own; begin a new run for each member i: "
+            "v=run.v[-1][..., i], y=run.y[-1][..., i], t0=float(run.stopped_at[i])",
         ),
         (
             lambda: run(resume=run(steps=50, events=sw.Event(_height, terminal=True))),
-            "begin a new run from there: v=run.v[-1], y=run.y[-1], t0=float(run.stopped_at)",
+            "resume: the run stopped at an event, at a time of its own; begin a new run from there: "
+            "v=run.v[-1], y=run.y[-1], t0=float(run.stopped_at)",
         ),
         (
             lambda: run(sw.Oscillator(damping=0.1), "verlet"),
@@ -141,11 +199,26 @@ BAD: dict[type[Exception], list[tuple[Callable[[], Any], str]]] = {
         ),
         (
             lambda: run(sw.LinearSystem([[-1.0, -1.0], [1.0, 0.0]]), "verlet"),
-            "has velocities in the rows of v; use false_euler, or leave velocities in the rows of v out",
+            "use rk4, or implicit_midpoint, which keeps what turns, or leave velocities in the rows of v out",
         ),
         (lambda: sw.export(sw.Chain(10**7), "rk4", "c"), "at most 3000000 are written; export a smaller system"),
     ],
     errors.DTypeError: [
+        (
+            lambda: world(v=np.zeros(()), y=np.float64(1.0)),
+            "y: expected a NumPy array to step in place, got float64; one number is np.array(1.0)",
+        ),
+        (lambda: sw.stability_limit("rk4", sw.Oscillator()), "method: expected the name of a method, got Oscillator"),  # type: ignore[arg-type]
+        (lambda: sw.sweep(sw.Oscillator, "rk4", {"omega": ("w", [1.0])}), "axes stand before the method"),  # type: ignore[arg-type]
+        # As a list it was one for each member, as a tuple a pair.
+        *(
+            (lambda wrong=wrong: paced(tolerance=wrong), "tolerance: expected a number, an array, or a tuple (relative")
+            for wrong in ([1e-3], [1e-3, 1e-6], [1e-3, 1e-6, 1e-9])
+        ),
+        (lambda: sw.Floor(0.2), "Floor: too many positional arguments; expected Floor(*, restitution=1.0, friction=None, normal"),  # type: ignore[misc]
+        (lambda: sw.Floor(height=0.2), "Floor: got an unexpected keyword argument 'height'; expected Floor(*, restitution"),  # type: ignore[call-arg]
+        (lambda: sw.Sphere(), "Sphere: missing a required argument: 'centre'; expected Sphere(centre, radius, *, inside"),  # type: ignore[call-arg]
+        (lambda: sw.NBody([1.0], mass=2.0), "NBody: got an unexpected keyword argument 'mass'; expected NBody(masses="),  # type: ignore[call-arg]
         (lambda: run(system="oscillator"), "system: expected a stepwell system such as Oscillator(), got str"),
         (lambda: run(resume=1.0), "resume: expected a Run or a World that goes on, got 1.0"),
         (
@@ -155,8 +228,8 @@ BAD: dict[type[Exception], list[tuple[Callable[[], Any], str]]] = {
         (lambda: run(dt="fast"), "dt: expected real numbers in units of time, got 'fast'"),
         (lambda: run(steps=2.5), "steps: expected a whole number, got 2.5 (float)"),
         (lambda: run(steps=True), "steps: expected a whole number, got True (bool)"),
-        (lambda: run(y=1j), "y: expected real numbers, got 1j"),
-        (lambda: run(y=np.ones(3, complex)), "y: expected real numbers, got an array of dtype complex128"),
+        (lambda: run(y=np.ones(3, complex)), "y: expected real numbers, got an array of dtype complex128; write the equations"),
+        (lambda: run(y=1j), r"y: expected real numbers, got 1j; write the equations of real and imaginary parts: of dz/dt"),
         (lambda: run(y=[True, False]), "y: expected real numbers, got an array of dtype bool"),
         (lambda: sw.Oscillator(x="wave"), "x: expected real numbers, got 'wave'"),
         (lambda: sw.LinearSystem("A"), "A: expected real numbers, got 'A'"),
@@ -316,8 +389,7 @@ def test_numbers_in_other_clothes() -> None:
 def test_aliased_arrays() -> None:
     both = np.zeros(6)
     for v, y in ((both[:3], both[:3]), (both[:4], both[2:])):
-        with pytest.raises(errors.ArgumentError, match="got arrays that share memory"):
-            world(v=v, y=y)
+        refused(errors.ArgumentError, "got arrays that share memory", world, v=v, y=y)
     world(v=both[:3], y=both[3:])  # neighbours are fine
 
 
@@ -326,8 +398,7 @@ def test_kernels_that_are_not_there(monkeypatch: pytest.MonkeyPatch) -> None:
     for name in ("avx1024", "baseline", "AVX2", "NEON", "interpret,avx2", " "):
         monkeypatch.setenv("STEPWELL_KERNELS", name)
         for asks in (run, world, sw.isa):
-            with pytest.raises(errors.ArgumentError, match=f'STEPWELL_KERNELS="{name}" names no kernels of this machine; it has'):
-                asks()
+            refused(errors.ArgumentError, f'STEPWELL_KERNELS="{name}" names no kernels of this machine; it has', asks)
 
 
 def test_one_tree() -> None:
@@ -339,13 +410,11 @@ def test_one_tree() -> None:
     assert issubclass(errors.UnknownNameError, LookupError)
     assert issubclass(errors.DTypeError, TypeError)
     assert issubclass(errors.TooLargeError, MemoryError)
+    assert issubclass(errors.FixedError, AttributeError)
 
 
 def test_the_core_refuses_too() -> None:
     """Python checks first; whoever uses the core directly still gets an error and no panic."""
-    from stepwell import _core
-    from stepwell.runs import engine
-
     one, system = np.ones((1, 1)), sw.Oscillator()
     free: dict[str, Any] = {"form": "canonical", "omega": one}
 
@@ -361,7 +430,7 @@ def test_the_core_refuses_too() -> None:
     linear: dict[str, Any] = {"kernel": "linear", "parameters": {"kind": "", "n_v": 1, "rows": np.ones((4, 1)), "inputs": 0}}
     for options, text in (
         ({"kernel": "oscilator"}, 'there is no system "oscilator"'),
-        ({"method": "rk5"}, 'there is no method "rk5"'),
+        ({"method": "rk44"}, 'there is no method "rk44"'),
         ({"parameters": free | {"form": "round"}}, "has no kernel for the options"),
         (
             {"parameters": free | {"damping": one}, "method": "verlet"},
@@ -386,5 +455,34 @@ def test_the_core_refuses_too() -> None:
         ({"tally": np.zeros(3)}, "tally: expected 0, got 3"),
         ({"parameters": free | {"omega": np.ones((1, 3))}}, "a parameter: expected 4, got 3"),
     ):
-        with pytest.raises(ValueError, match=re.escape(text)):
-            core(**options)
+        refused(ValueError, re.escape(text), core, **options)
+
+
+def test_names_of_ones_own() -> None:
+    """Other names may stand anywhere, and so may v for the state where there is no velocity, and any name as a parameter's."""
+    sw.system(lambda t, x, y: -y)
+    sw.system(lambda time, v, x: -x)
+    sw.system(order=1)(lambda t, v: -v)
+    sw.system(order=1)(lambda t, x, *, v=1.0, y=2.0: -v * x * y)
+    sw.solve_ivp(lambda x, u: -u, (0.0, 1.0), [1.0])
+    first.invariant(lambda t, v, *, k: k * v)
+    first(k=np.cos)
+
+
+def test_numbers_that_may_be_several() -> None:
+    """An array of tolerances is one for each member, a tuple a pair; an array whose mask is empty is an array."""
+    assert paced(tolerance=np.array([1e-3, 1e-6])).y.shape == paced(tolerance=(1e-3, [1e-6, 1e-9])).y.shape == (1, 2)
+    assert run(y=np.ma.masked_array([1.0, 2.0, 3.0], False)).y.shape == (1, 3)
+
+
+def test_errors_mean_something_only_beside_the_scenes_own_system() -> None:
+    kepler, ask = sw.scenes.kepler(), {"dt": 0.001, "steps": 10}
+    others = sw.NBody([1.0, 0.5], force="newton"), sw.NBody([1.0, 0.0], force="newton", G=2.0), sw.NBody([1.0, 0.0])
+    runs = [sw.integrate(other, "rk4", v=kepler.v, y=kepler.y, **ask) for other in others]
+    runs.append(sw.integrate(kepler.system, "rk4", v=kepler.v[..., None], y=kepler.y[..., None], **ask))
+    for of in (kepler.state_error, kepler.energy_error, kepler.amplitude):
+        for each in runs:
+            refused(errors.ArgumentError, "run: expected a run of the scene kepler, one member of NBody", of, each)
+        refused(errors.DTypeError, r"run: expected what scene\.run returns, got float", of, 1.0)
+    for control in (None, sw.EnergyControl(0.1), sw.Projection()):
+        assert kepler.state_error(kepler.run("rk4", 0.001, steps=10, control=control)).max() < 1e-3

@@ -1,7 +1,5 @@
 """Where events are: against closed forms, with the order of the method or with the tolerance; and mistakes that are noticed."""
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Callable
 from functools import partial
@@ -11,16 +9,16 @@ import mpmath
 import numpy as np
 import pytest
 import stepwell as sw
+from stepwell import _core
 from stepwell.base.arrays import Array
 from stepwell.reference import events
 from stepwell.runs.events import collected, trials
+from stepwell.runs.events.evaluated import Evaluated
 from stepwell.runs.events.trials import AdaptiveTrials, Trials
 from support.events import ABLE, U
 from support.stiff import lorenz
 
 zero = sw.Event(lambda t, v, y: y, name="zero")
-
-# ---- the search within a step
 
 
 def shares_of(g: Callable[[Any], Any], n: int = 1) -> tuple[Any, int]:
@@ -101,9 +99,6 @@ def test_smooth_functions_take_few_trials_and_members_do_not_matter() -> None:
         assert alone == share[i]
 
 
-# ---- against the method's own motion, to the last digits
-
-
 def polynomial(order: int) -> Callable[[Any], Any]:
     """The multiple of a mode in a step of a Runge-Kutta method of so many stages and that order, up to 4."""
     return lambda x: sum(x**j / mpmath.factorial(j) for j in range(order + 1))
@@ -112,11 +107,9 @@ def polynomial(order: int) -> Callable[[Any], Any]:
 @pytest.mark.parametrize(("method", "order"), [("standard_euler", 1), ("standard_heun", 2), ("rk4", 4)])
 def test_the_place_is_that_of_a_step_of_the_method_from_the_start_of_its_step(method: str, order: int) -> None:
     """For ẏ = v, v̇ = −y, z = y + iv becomes R(−ih)·z in a step, so that the zero of y after k steps and a share s of one solves
-    Re(R(−ish)·R(−ih)ᵏ) = 0, which is solved in 30 digits.
-
-    Bound: a step makes at most 40 roundings of numbers of size up to 1.5 (Standard Euler grows to 1.2 up to t = 4), which move y
-    by at most 60·U; y moves at a speed of 0.9 or more at its zero, so t is off by at most 67·U·(k + 1), and by the width, and by
-    the rounding of t.
+    Re(R(−ish)·R(−ih)ᵏ) = 0, which is solved in 30 digits. Bound: a step makes at most 40 roundings of numbers of size up to 1.5
+    (Standard Euler grows to 1.2 up to t = 4), which move y by at most 60·U; y moves at a speed of 0.9 or more at its zero, so t
+    is off by at most 67·U·(k + 1), and by the width, and by the rounding of t.
     """
     h = 0.1
     down = sw.Event(lambda t, v, y: y, direction=-1, name="down")
@@ -134,8 +127,7 @@ def test_the_place_is_that_of_a_step_of_the_method_from_the_start_of_its_step(me
     assert -2 * bound <= place.y[0] <= 2 * bound
 
 
-# ---- against the true motion, with the order of the method or with the tolerance
-
+# Against the true motion, with the order of the method or with the tolerance.
 #: A quarter of the period of a pendulum that begins at 1 rad, at rest: π/2/agm(1, cos ½) (Gauss).
 QUARTER = float(mpmath.pi / 2 / mpmath.agm(1, mpmath.cos(0.5)))
 half = sw.Event(lambda t, v, y: y - 0.5, name="half")
@@ -156,8 +148,10 @@ def pendulum(method: str, dt: float) -> float:
 
 def passage(method: str, tolerance: float) -> tuple[float, float]:
     """By how much it is late, and by how much it is so by the state at the right time."""
-    run = sw.integrate(sw.Pendulum(), method, v=0.0, y=1.0, tolerance=tolerance, at=[7.0 * QUARTER, 13.0], events=zero)
-    return float(run.events["zero"].t[3]) - 7.0 * QUARTER, float(-run.y[0] / run.v[0])
+    ask: dict[str, Any] = {"v": 0.0, "y": 1.0, "tolerance": tolerance}
+    run = sw.integrate(sw.Pendulum(), method, **ask, at=[13.0], events=zero)
+    there = sw.integrate(sw.Pendulum(), method, **ask, at=[7.0 * QUARTER])  # the last time has the order of the method
+    return float(run.events["zero"].t[3]) - 7.0 * QUARTER, float(-there.y[0] / there.v[0])
 
 
 def pericentre(method: str, **steps: Any) -> float:
@@ -175,7 +169,7 @@ def driven(method: str, **steps: Any) -> float:
 
 
 #: The longest step, short enough that the error is nearly c·hᵖ, and long enough that it is far above the roundings.
-STEP = {8: 0.8, 5: 0.1, 4: 0.1, 2: 0.02, 1: 0.005}
+STEP = {9: 0.8, 8: 0.8, 7: 0.3, 5: 0.1, 4: 0.1, 3: 0.05, 2: 0.02, 1: 0.005}
 
 
 def order_of(error: Callable[[str, float], float], method: str, dt: float) -> float:
@@ -262,9 +256,6 @@ def error_of_bounces(method: str, t: float = 0.0, **steps: Any) -> float:
     return float(np.abs(np.array(times) - expected).max())
 
 
-# ---- more than one in a step
-
-
 @sw.system(order=1)
 def integrated(t: Any, y: Any, *, a: float = 0.0, b: float = 0.0, c: float = 0.0) -> Any:
     """ẏ = p'(t) for the polynomial p with these roots, so that y = p(t)."""
@@ -284,10 +275,8 @@ def roots_by(method: str, roots: Any, begin: float, **steps: Any) -> Any:
 
 def two_changes_in_an_adaptive_step(method: str, tolerance: float, cubics: int = 12) -> None:
     """A method of third order or more makes no error in a cubic, so that its steps grow as long as they may: of twelve cubics the
-    changes of sign come in pairs in one step, at any place of it.
-
-    Bound: y is off by the roundings of a hundred numbers up to 8.4³ < 600, and moves by 0.02² a unit of time or more at its
-    zeros, which are 0.02 apart or more.
+    changes of sign come in pairs in one step, at any place of it. Bound: y is off by the roundings of a hundred numbers up to
+    8.4³ < 600, and moves by 0.02² a unit of time or more at its zeros, which are 0.02 apart or more.
     """
     random = np.random.default_rng(5)
     for _ in range(cubics):
@@ -346,9 +335,6 @@ def test_mistake_a_step_whose_ends_have_one_sign_is_not_looked_into(monkeypatch:
         test_the_core_notices_a_step_there_and_back()
 
 
-# ---- whatever the units are
-
-
 def test_a_way_from_rest_takes_its_time_in_any_unit() -> None:
     """y = t²/2 in some unit of time is at a length after √(2·length), also where that is a tiny share of the first step.
 
@@ -375,9 +361,6 @@ def test_events_are_located_in_any_unit_of_time() -> None:
         within = 1e-6 if sw.method(method).order == 2 else 1e-8
         passed = run.events["zero"].t * omega / np.pi
         np.testing.assert_allclose(passed, [0.5, 1.5, 2.5], rtol=within, err_msg=f"{method}, {omega}")
-
-
-# ---- mistakes
 
 
 def straight(trial: Any, low: Any, high: Any, before: Any, after: Any, v: Any, y: Any) -> Any:
@@ -484,3 +467,32 @@ def test_events_of_a_run_that_diverges_end_and_leave_its_bits() -> None:
     with pytest.warns(sw.DivergenceWarning):
         assert np.array_equal(run().y, located.y, equal_nan=True)
     assert located.status == sw.Status.DIVERGED
+
+
+def test_values_by_the_core_are_those_line_by_line():
+    """Of any number of members, with numbers that they share, of two axes, and with values that are leaves or equal."""
+    tape = _core.Tape()
+    x, y, p = tape.state(0), tape.state(1), tape.param(0)
+    values = [(x * y + p).sqrt() / (y - 0.25), x, x, p, (x < y).choose(x, p * 3.0), tape.number(2.0), x * y + p]
+    core, lines = (Evaluated(tape, values, 2, by_core=by_core) for by_core in (True, False))
+    rng = np.random.default_rng(3)
+    for shape in [(), (1,), (7,), (64,), (3, 1001)]:
+        own, shared = rng.normal(size=shape), rng.normal(size=shape[-1:])
+        for numbers in [([own, shared], [0.5]), ([shared, own], [rng.normal(size=shape)]), ([0.25, own], [np.array(0.1)])]:
+            for a, b in zip(core(*numbers), lines(*numbers), strict=True):
+                np.testing.assert_array_equal(np.broadcast_to(a, shape), np.broadcast_to(b, shape))
+    evaluation = tape.evaluation(values, 2)
+    with pytest.raises(sw.errors.ArgumentError, match="expected one number or 3, got 2"):
+        evaluation(3, [np.zeros(2), 1.0], [1.0])
+    assert tape.evaluation([tape.time() * x], 2) is None
+
+
+def test_steps_of_many_bodies_are_not_traced_for_their_events(monkeypatch: pytest.MonkeyPatch) -> None:
+    """On a tape 150 bodies are half a million operations, which Python writes in a second; the core has loops for them."""
+    monkeypatch.setattr(trials, "Evaluated", None)  # would be called
+    y = np.random.default_rng(1).normal(size=(150, 3))
+    near = sw.Event(lambda t, v, y: y[0, 0] - 0.3 * y[1, 0], name="near")
+    bodies, state = sw.NBody(np.full(150, 1 / 150), softening=0.1), {"v": np.zeros_like(y), "y": y}
+    run = sw.integrate(bodies, "leapfrog", **state, dt=0.01, steps=300, events=near)
+    assert run.events["near"].count == 1
+    sw.integrate(bodies, "dop853", **state, tolerance=1e-6, at=[2.0], events=near)

@@ -1,10 +1,7 @@
 """A run in pieces: what ``resume`` carries, and what is refused."""
 
-from __future__ import annotations
-
 import pickle
 import re
-import warnings
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +13,8 @@ from stepwell.errors import ArgumentError
 from stepwell.runs.continuation import Continuation
 from support.cases import SYSTEMS, number
 from support.families import LONG, family
+from support.heard import quiet
+from support.refusals import refused
 
 #: A method of each kind of step, and of those with an estimate.
 KINDS = ("false_euler", "rk4", "verlet", "leapfrog", "pefrl", "dop853", "taylor", "rodas4", "trapezoidal")
@@ -27,10 +26,8 @@ def chain() -> sw.Chain:
 
 
 def piece(method: str, steps: int, **options: Any) -> sw.Run:
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", sw.DivergenceWarning)
-        start = {} if {"v", "resume"} & set(options) else {"v": 1.0, "y": np.ones((4, 2)), "dt": 0.1}
-        return sw.integrate(chain(), method, steps=steps, **start, **options)
+    start = {} if {"v", "resume"} & set(options) else {"v": 1.0, "y": np.ones((4, 2)), "dt": 0.1}
+    return quiet(sw.integrate, chain(), method, steps=steps, **start, **options)
 
 
 def test_another_step_is_refused() -> None:
@@ -52,8 +49,6 @@ def test_what_one_method_carries_is_not_for_another() -> None:
     with pytest.raises(ArgumentError, match="resume: expected a run with adaptive steps, since tolerance= or at= was given"):
         sw.integrate(chain(), "merson", at=[2.0], resume=half)
     chosen = sw.integrate(chain(), "merson", v=0.0, y=0.0, tolerance=1e-3, at=[1.0])
-    with pytest.raises(ArgumentError, match="steps: works with fixed steps only, and the run that goes on has adaptive steps"):
-        sw.integrate(chain(), "merson", steps=3, resume=chosen)
     with pytest.raises(ArgumentError, match="resume: expected a run with fixed steps, or a world, got one with adaptive steps"):
         sw.World(chain(), "merson", resume=chosen)
 
@@ -74,16 +69,6 @@ def filed(run: sw.Run, folder: Path, **options: Any) -> sw.Run:
     """Written to a file, and read."""
     run.save(folder / "run.npz")
     return sw.load(folder / "run.npz", **options)
-
-
-def test_times_of_before_are_refused() -> None:
-    first = sw.integrate(sw.Pendulum(), "merson", v=0.1, y=1.0, tolerance=1e-5, at=[1.0, 2.0])
-    ascend = "at: expected times that ascend from the last time of the run that goes on, 2, on"
-    with pytest.raises(ArgumentError, match=ascend):
-        sw.integrate(sw.Pendulum(), "merson", at=[1.5], resume=first)
-
-
-# ---- with another system
 
 
 @sw.system
@@ -192,12 +177,12 @@ def test_a_carry_of_fixed_steps_is_of_its_system_too(method: str, world: bool) -
     np.testing.assert_allclose(np.divide(errors[:-1], errors[1:]), 4.0, rtol=0.01)
 
 
-@pytest.mark.parametrize("method", ["verlet", "leapfrog"])
-def test_a_kick_between_pieces_of_fixed_steps_counts(method: str) -> None:
-    first = sw.integrate(spring(), method, v=0.0, y=1.0, dt=0.1, steps=10)
-    rest = sw.integrate(spring(), method, steps=10, resume=first, v=first.v[-1] + 1.0)
-    fresh = sw.integrate(spring(), method, v=first.v[-1] + 1.0, y=first.y[-1], dt=0.1, start_step=10, steps=10)
-    np.testing.assert_array_equal(rest.y, fresh.y)
+def test_a_kick_between_pieces_of_fixed_steps_counts() -> None:
+    for method in ("verlet", "leapfrog"):
+        first = sw.integrate(spring(), method, v=0.0, y=1.0, dt=0.1, steps=10)
+        rest = sw.integrate(spring(), method, steps=10, resume=first, v=first.v[-1] + 1.0)
+        fresh = sw.integrate(spring(), method, v=first.v[-1] + 1.0, y=first.y[-1], dt=0.1, start_step=10, steps=10)
+        np.testing.assert_array_equal(rest.y, fresh.y, err_msg=method)
 
 
 @pytest.mark.parametrize("name", family(SYSTEMS, lambda name: not LONG and number(name, "known") % 3 == 0))
@@ -254,5 +239,4 @@ def test_events_that_change_the_state_are_asked_for(first: Any, second: Any, who
 def test_a_world_asks_for_them_too() -> None:
     world = sw.World(drug(), "rk4", v=np.zeros((0, 2)), y=np.ones(2), dt=0.1, events=dose)
     world.step(40)
-    with pytest.raises(ArgumentError, match=r"events: .* whose state was changed by dose"):
-        sw.World(drug(), "rk4", resume=world)
+    refused(ArgumentError, r"events: .* whose state was changed by dose", sw.World, drug(), "rk4", resume=world)

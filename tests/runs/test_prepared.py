@@ -1,14 +1,12 @@
 """A prepared run is that of ``integrate``, to the bit, with its errors and warnings; and ``integrate`` itself prepares."""
 
-from __future__ import annotations
-
 import copy
 import gc
 import itertools
+import math
 import pickle
 import re
 import threading
-import warnings
 import weakref
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
@@ -20,7 +18,10 @@ import stepwell as sw
 from stepwell.runs import recent as module
 from support.cases import number
 from support.families import family
+from support.heard import heard
+from support.looped import looped
 from support.own_systems import duffing, lorenz, lotka_volterra, pendulum, top
+from support.refusals import refused
 
 OPTIONS: list[dict[str, Any]] = [
     {}, {"every": 1}, {"every": 7}, {"dtype": "float32"}, {"fused": True}, {"t0": 3.0, "start_step": 5, "every": 3},
@@ -57,9 +58,7 @@ def whole(*arguments: Any, **options: Any) -> sw.Run:
 
 def with_warnings(call: Any) -> tuple[sw.Run, list[str]]:
     """The run and what was warned of, with the file of the line."""
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
-        run = call()
+    run, caught = heard(lambda: call())  # so that the line is one of this file
     return run, [f"{each.filename} {each.category.__name__} {each.message}" for each in caught]
 
 
@@ -83,8 +82,7 @@ def test_it_makes_the_run_of_integrate(method: str) -> None:
             try:
                 expected = [whole(system, method, v=v, y=y, **arguments) for v, y in starts]
             except sw.StepwellError as error:
-                with pytest.raises(type(error), match=re.escape(str(error))):
-                    sw.prepare(system, method, v=0.1, y=1.0, **arguments)
+                refused(type(error), re.escape(str(error)), sw.prepare, system, method, v=0.1, y=1.0, **arguments)
                 continue
             run = sw.prepare(system, method, v=0.1, y=1.0, **arguments)
             long = {"record", "form", "backend"} & options.keys() or sw.method(method).is_exact
@@ -94,35 +92,6 @@ def test_it_makes_the_run_of_integrate(method: str) -> None:
 
 
 ORBIT: dict[str, Any] = {"tolerance": 1e-6, "at": [0.5, 3.0]}
-PAIR = (np.zeros((2, 2)), np.eye(2))
-OTHERS: list[Any] = [
-    (sw.Oscillator(1.3), "dop853", (0.0, 1.0), (0.5, 2.0), ORBIT),
-    (sw.Oscillator(np.linspace(1.0, 2.0, 3)), "taylor", (0.0, np.ones(3)), (1.0, np.arange(3.0)), ORBIT),
-    (sw.Pendulum(), "fehlberg", (0.0, 1.0), (2.5, 0.0), ORBIT | {"every": 2, "at": [9.0]}),
-    (sw.Pendulum(), "fehlberg", (0.0, 1.0), (2.5, 0.0), ORBIT | {"at": [-3.0]}),
-    (sw.Pendulum(), "rodas4", (0.0, 1.0), (0.1, 0.0), ORBIT | {"dtype": "float32", "tolerance": 1e-4}),
-    (lorenz(), "dop853", (None, np.ones(3)), (None, np.array([3.0, 1.0, 20.0])), ORBIT),
-    (lorenz(), "dop853", (None, np.ones(3)), (None, np.array([3.0, 1.0, 20.0])), ORBIT | {"positive": 2}),
-    (lorenz(), "rk4", (None, np.ones(3)), (None, np.array([3.0, 1.0, 20.0])), {**DT, "events": lambda t, y: y[0] - 1.0}),
-    (lorenz(), "dop853", (None, np.ones(3)), (None, np.array([3.0, 1.0, 20.0])), ORBIT | {"events": lambda t, y: y[0] - 1.0}),
-    (sw.NBody([1.0, 1.0]), "semi_false_heun", PAIR, (np.eye(2), np.eye(2)), {**DT, "control": sw.EnergyControl(0.5)}),
-    (sw.Oscillator(), "rk4", (0.0, 1.0), (0.5, -1.0), {**DT, "t0": np.arange(3.0)}),
-    (sw.Oscillator(), "rk4", (0.0, 1.0), (0.5, -1.0), {**DT, "force": np.arange(3.0)}),
-    (sw.Oscillator(), "exact", (0.0, 1.0), (0.5, -1.0), {**DT, "every": 4}),
-    (sw.NBody([1.0, 1.0]), "leapfrog", PAIR, (np.eye(2), 2.0 * np.eye(2)), {**DT, "record": "energy"}),
-]  # fmt: skip
-
-
-def test_other_runs_are_made_too() -> None:
-    """Those that are not short, some of which are checked as a whole each time."""
-    for system, method, start, other, arguments in OTHERS:
-        run = sw.prepare(system, method, v=start[0], y=start[1], **arguments)
-        for v, y in (other, start, other):
-            got, warned = with_warnings(partial(run, v, y))
-            expected, said = with_warnings(partial(whole, system, method, v=v, y=y, **arguments))
-            assert said == warned
-            assert got.events == expected.events
-            assert_same(got, expected)
 
 
 ADAPTIVE: list[dict[str, Any]] = [
@@ -164,8 +133,7 @@ def test_adaptive_runs_are_those_of_integrate(method: str, every: int) -> None:
             for v, y in starts:
                 expected.append(with_warnings(partial(whole, system, method, v=v, y=y, **arguments)))
         except sw.StepwellError as error:
-            with pytest.raises(type(error), match=re.escape(str(error))):
-                sw.prepare(system, method, v=v, y=y, **arguments)
+            refused(type(error), re.escape(str(error)), sw.prepare, system, method, v=v, y=y, **arguments)
             continue
         run = sw.prepare(system, method, v=starts[0][0], y=starts[0][1], **arguments)
         assert run._short is not None
@@ -183,10 +151,11 @@ def test_adaptive_runs_are_those_of_integrate(method: str, every: int) -> None:
 def test_arrays_and_lists_among_the_options_are_copied() -> None:
     """What is written into them later is not seen."""
     for at in (np.array([1.0, 2.0]), [1.0, 2.0]):
-        push = np.array(1.0)
-        run = sw.prepare(sw.Oscillator(), "dop853", v=0.0, y=1.0, tolerance=1e-6, at=at, force=push)
+        push, relative = np.array(1.0), np.array(1e-6)
+        run = sw.prepare(sw.Oscillator(), "dop853", v=0.0, y=1.0, tolerance=(relative, 1e-9), at=at, force=push)
         expected = run(0.0, 1.0).y.copy()
-        at[1], push[...] = 5.0, 7.0
+        at[1], push[...], relative[...] = 5.0, 7.0, 1e-2
+        run._request = run._short = None  # what was checked is checked again
         for _ in range(2):
             assert run(0.0, 1.0).y.tobytes() == expected.tobytes()
 
@@ -194,9 +163,8 @@ def test_arrays_and_lists_among_the_options_are_copied() -> None:
 def test_systems_of_first_order_have_no_velocities() -> None:
     """v is left out, by place or by name."""
     run = sw.prepare(lorenz(), "rk4", y=[1.0, 1.0, 1.0], dt=0.01, steps=10)
-    for y in ([1.0, 2.0, 3.0], np.array([1.0, 2.0, 3.0])):
-        assert_same(run(y=y), whole(lorenz(), "rk4", y=y, dt=0.01, steps=10))
-        assert_same(run(None, y), run(y=y))
+    assert_same(run(y=[1.0, 2.0, 3.0]), whole(lorenz(), "rk4", y=[1.0, 2.0, 3.0], dt=0.01, steps=10))
+    assert_same(run(None, np.array([1.0, 2.0, 3.0])), run(y=[1.0, 2.0, 3.0]))
     assert run._short is not None
 
 
@@ -227,12 +195,16 @@ def test_errors_are_those_of_integrate() -> None:
         with pytest.raises(type(expected.value)) as raised:
             run(v, y)
         assert str(raised.value) == str(expected.value)
-    with pytest.raises(sw.errors.ArgumentError, match=r"prepare: expected arguments of integrate, got step="):
-        sw.prepare(system, "rk4", v=0.0, y=1.0, dt=0.1, step=5)
-    with pytest.raises(sw.errors.ArgumentError, match=r"resume: a prepared run begins at the start of its call"):
-        sw.prepare(system, "rk4", dt=0.1, steps=5, resume=whole(system, "rk4", v=0.0, y=1.0, **arguments))
-    with pytest.raises(sw.errors.ArgumentError, match="steps"):
-        sw.prepare(system, "rk4", v=0.0, y=1.0, dt=0.1, steps=0)
+    positive = sw.prepare(lorenz(), "dop853", y=np.ones(3), positive=2, **ORBIT)
+    with pytest.raises(sw.errors.ArgumentError, match=r"positive: expected a start at which y\[2\] is not negative"):
+        positive(None, [1.0, 1.0, -1.0])
+    wrong: list[tuple[dict[str, Any], str]] = [
+        ({"step": 5}, "prepare: expected arguments of integrate, got step="),
+        ({"resume": whole(system, "rk4", v=0.0, y=1.0, **arguments)}, "resume: a prepared run begins at the start of its call"),
+        ({"steps": 0, "v": 0.0, "y": 1.0}, "steps"),
+    ]
+    for options, message in wrong:
+        refused(sw.errors.ArgumentError, message, sw.prepare, system, "rk4", **arguments | options)
 
 
 WARNED: list[Any] = [
@@ -274,6 +246,34 @@ def test_runs_share_no_arrays() -> None:
     assert_same(run(0.0, 1.0), expected)
 
 
+@looped("pace", [{"dt": 0.1, "steps": 4, "every": 2}, {"tolerance": 1e-6, "at": [0.0, 0.5, 1.0]}])
+@looped("t0", [0.0, 2.0, np.array([0.0, 1.0])])
+def test_what_is_written_into_a_run_of_integrate_is_in_no_other(pace: dict[str, Any], t0: Any) -> None:
+    def arrays(run: sw.Run) -> list[Any]:
+        return [np.copy(each) for each in (run.t, run.t0, run.v, run.y, run.status, run.first_bad_step)]
+
+    at = {"at": np.expand_dims(pace["at"], 1) + t0 if np.ndim(t0) else np.add(pace["at"], t0).tolist()} if "at" in pace else {}
+    system, prepared = sw.Oscillator(np.ones(2)), []
+    start = {"v": 0.0, "y": 1.0, **pace, **at, "t0": t0}
+    prepared = sw.prepare(system, "dop853", **start)
+    for make in (lambda: sw.integrate(system, "dop853", **start), lambda: prepared(0.0, 1.0)):
+        expected = arrays(make())
+        for _ in range(4):
+            run = make()
+            for own, other in zip(arrays(run), expected, strict=True):
+                assert np.array_equal(own, other)
+            for each in (run.t, run.t0, run.v, run.y, run.status, run.first_bad_step):
+                if isinstance(each, np.ndarray):
+                    each[...] = 7
+
+
+def test_zeros_of_either_sign_are_different_options() -> None:
+    for t0 in (0.0, -0.0, 0.0, -0.0, 0.0, -0.0):
+        run = sw.integrate(sw.Oscillator(), "dop853", v=0.0, y=1.0, tolerance=1e-6, at=[t0, 1.0], t0=t0)
+        assert np.signbit(run.t).tolist() == [t0.hex()[0] == "-", False]
+        assert math.copysign(1.0, run.t0) == math.copysign(1.0, t0)
+
+
 def test_copies_make_the_same_runs() -> None:
     """Also in another process, by pickle."""
     run = sw.prepare(sw.Oscillator(1.7), "rk4", v=0.0, y=1.0, dt=0.1, steps=4)
@@ -284,36 +284,29 @@ def test_copies_make_the_same_runs() -> None:
 
 
 def test_threads_may_call_it_at_once() -> None:
-    """Every call has its own start and result."""
+    """Every call has its own start and result; from the first adaptive one what does not depend on the start is known."""
     run = sw.prepare(sw.Oscillator(np.linspace(1.0, 2.0, 200)), "rk4", v=0.0, y=1.0, dt=0.01, steps=300)
-    expected = [run(0.0, float(i)).y for i in range(8)]
-    in_threads(lambda i: [np.testing.assert_array_equal(run(0.0, float(i)).y, expected[i]) for _ in range(50)])
-
-
-def test_threads_may_make_the_first_adaptive_run_at_once() -> None:
-    """From which what does not depend on the start is known."""
-    expected = [whole(sw.Oscillator(), "dop853", v=0.0, y=float(i), **ORBIT) for i in range(8)]
+    fixed = [run(0.0, float(i)).y for i in range(8)]
+    in_threads(lambda i: [np.testing.assert_array_equal(run(0.0, float(i)).y, fixed[i]) for _ in range(50)])
+    adaptive = [whole(sw.Oscillator(), "dop853", v=0.0, y=float(i), **ORBIT) for i in range(8)]
     for _ in range(50):
-        run, gate = sw.prepare(sw.Oscillator(), "dop853", v=0.0, y=1.0, **ORBIT), threading.Barrier(8)
+        first, gate = sw.prepare(sw.Oscillator(), "dop853", v=0.0, y=1.0, **ORBIT), threading.Barrier(8)
 
-        def work(i: int, run: Any = run, gate: Any = gate) -> None:
+        def work(i: int, run: Any = first, gate: Any = gate) -> None:
             gate.wait()
-            assert_same(run(0.0, float(i)), expected[i])
+            assert_same(run(0.0, float(i)), adaptive[i])
 
         in_threads(work)
 
 
 def test_threads_may_call_integrate_at_once() -> None:
     """More runs than are kept, of systems that are made anew."""
-    expected = [
-        whole(sw.Oscillator(1.0 + i), "rk4", v=0.0, y=1.0, dt=0.1, steps=3).y.tobytes() for i in range(2 * module.MOST_RECENT)
-    ]
+    ask, omegas = {"v": 0.0, "y": 1.0, "dt": 0.1, "steps": 3}, 1.0 + np.arange(2 * module.MOST_RECENT)
+    expected = [whole(sw.Oscillator(omega), "rk4", **ask).y.tobytes() for omega in omegas]
 
     def work(_: int) -> None:
         for _ in range(10):
-            for i, bits in enumerate(expected):
-                run = sw.integrate(sw.Oscillator(1.0 + i), "rk4", v=0.0, y=1.0, dt=0.1, steps=3)
-                assert run.y.tobytes() == bits, i
+            assert [sw.integrate(sw.Oscillator(omega), "rk4", **ask).y.tobytes() for omega in omegas] == expected
 
     in_threads(work)
     assert len(module._recent) <= module.MOST_RECENT + 8
@@ -378,8 +371,7 @@ def test_integrate_knows_a_run_by_all_of_its_options() -> None:
     system = sw.Oscillator(1.5)
     for _ in range(3):
         sw.integrate(system, "rk4", v=0.0, y=1.0, dt=1.0, steps=1)
-    with pytest.raises(sw.StepwellError, match="steps"):
-        sw.integrate(system, "rk4", v=0.0, y=1.0, dt=1.0, steps=True)
+    refused(sw.StepwellError, "steps", sw.integrate, system, "rk4", v=0.0, y=1.0, dt=1.0, steps=True)
     with pytest.raises(sw.StepwellError, match="fused"):
         sw.integrate(system, "rk4", v=0.0, y=1.0, dt=1.0, steps=1, fused=0)  # type: ignore[arg-type]
     for omega in np.linspace(0.5, 2.0, 50):
@@ -442,8 +434,7 @@ def test_integrate_notices_another_level(monkeypatch: pytest.MonkeyPatch) -> Non
             sw.integrate(system, "rk4", v=0.0, y=1.0, dt=0.1, steps=3)
     assert len(module._recent) == len(sw.isa_levels())
     monkeypatch.setenv("STEPWELL_KERNELS", "mmx")
-    with pytest.raises(sw.errors.ArgumentError, match="mmx"):
-        sw.integrate(system, "rk4", v=0.0, y=1.0, dt=0.1, steps=3)
+    refused(sw.errors.ArgumentError, "mmx", sw.integrate, system, "rk4", v=0.0, y=1.0, dt=0.1, steps=3)
 
 
 def test_integrate_keeps_little_memory() -> None:

@@ -4,8 +4,6 @@ Such a call either works or ends, quickly, in one of stepwell's own errors that 
 by something below (NumPy, the core, Python inside a function) is a failure of the checks.
 """
 
-from __future__ import annotations
-
 import inspect
 import random
 import signal

@@ -1,16 +1,13 @@
 """Scenes of one's own in a Python file: on the command line, and by ``scenes.scene``."""
 
-from __future__ import annotations
-
-import json
 import pickle
 from pathlib import Path
-from typing import Any
 
 import pytest
 import stepwell as sw
 from stepwell.errors import ArgumentError, UnknownNameError
-from stepwell.views.cli import main
+from support.commands import complaint, listed, printed
+from support.refusals import refused
 
 FILE = """
 import numpy as np
@@ -31,29 +28,16 @@ def file(tmp_path: Path) -> str:
     return str(path)
 
 
-def report_of(capsys: pytest.CaptureFixture[str], *words: str) -> Any:
-    assert main([*words, "--json"]) == 0
-    return json.loads(capsys.readouterr().out)
-
-
-def test_run(file: str, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
-    report = report_of(capsys, "run", file, "--method", "rk4", "--dt", "0.01", "-o", str(tmp_path / "run.png"))
+def test_run_advise_explain_and_pickle(file: str, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    report = listed(capsys, "run", file, "--method", "rk4", "--dt", "0.01", "-o", str(tmp_path / "run.png"))
     scene = sw.scenes.scene(file)
     assert scene.name == report["scene"] == "my_scene"
     assert report["last_y"] == sw.integrate(scene.system, "rk4", v=0.0, y=1.0, dt=0.01, steps=500).y[-1]
     assert (tmp_path / "run.png").stat().st_size > 1000
-
-
-def test_advise_and_explain(file: str, capsys: pytest.CaptureFixture[str]) -> None:
-    advice = report_of(capsys, "advise", file, "--tolerance", "1e-3")
-    assert advice["best"]["error"] <= 1e-3
-    assert main(["explain", file, "rk4"]) == 0
-    assert "gamma" in capsys.readouterr().out
-
-
-def test_a_system_of_a_file_can_be_pickled(file: str) -> None:
     scene = sw.scenes.scene(file)
     assert pickle.loads(pickle.dumps(scene.system)) == scene.system
+    assert listed(capsys, "advise", file, "--tolerance", "1e-3")["best"]["error"] <= 1e-3
+    assert "gamma" in printed(capsys, "explain", file, "rk4")
 
 
 def test_several_scenes_are_told_apart(tmp_path: Path, file: str) -> None:
@@ -62,8 +46,7 @@ def test_several_scenes_are_told_apart(tmp_path: Path, file: str) -> None:
     assert sw.scenes.scene(f"{two}:fast").name == "fast"
     with pytest.raises(ArgumentError, match=r"expected one Scene in .*two\.py, got scene, fast; name one: .*two\.py:scene"):
         sw.scenes.scene(str(two))
-    with pytest.raises(UnknownNameError, match=r"scene: there is no 'fst'; did you mean 'fast'"):
-        sw.scenes.scene(f"{two}:fst")
+    refused(UnknownNameError, r"scene: there is no 'fst'; did you mean 'fast'", sw.scenes.scene, f"{two}:fst")
 
 
 def test_what_is_wrong_with_a_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -75,9 +58,6 @@ def test_what_is_wrong_with_a_file(tmp_path: Path, capsys: pytest.CaptureFixture
         ("import stepwell as sw\nscene = sw.Scene(sw.Pendulum(), v=0.0)\n", r"y: expected the coordinates"),
     ):
         path.write_text(text)
-        with pytest.raises(ArgumentError, match=message):
-            sw.scenes.scene(str(path))
-        assert main(["run", str(path), "--method", "rk4"]) == 2
-        assert capsys.readouterr().err.startswith("stepwell: ")
-    assert main(["run", "nowhere.py", "--method", "rk4"]) == 2
-    assert "there is no file 'nowhere.py'" in capsys.readouterr().err
+        refused(ArgumentError, message, sw.scenes.scene, str(path))
+        assert complaint(capsys, "run", str(path), "--method", "rk4").startswith("stepwell: ")
+    assert "there is no file 'nowhere.py'" in complaint(capsys, "run", "nowhere.py", "--method", "rk4")

@@ -1,7 +1,5 @@
 """Exported steps: the bits of ``integrate`` in C, and what is computed and called. tests/outer has the other languages."""
 
-from __future__ import annotations
-
 import math
 import re
 import sys
@@ -25,8 +23,8 @@ from support.export import (
     Knot,
     assert_same,
     exported,
-    lying,
     mutants,
+    net,
     oddly_named,
     shown,
     single,
@@ -34,16 +32,8 @@ from support.export import (
     with_lanes,
 )
 
-#: Every so many-th step of each set is run here.
-EVERY = {
-    "of all methods and systems": 9,
-    "pushed": 7,
-    "fused": 7,
-    "with choices": 4,
-    "of bits": 4,
-    "long steps": 4,
-    "with lanes": 4,
-}
+EVERY = dict.fromkeys(("with choices", "of bits", "long steps", "with lanes"), 4)
+EVERY |= {"of all methods and systems": 9, "pushed": 7, "fused": 7}
 
 
 @pytest.mark.skipif(missing("c"), reason="there is no C compiler here")
@@ -93,8 +83,6 @@ def test_a_step_that_rounds_less_is_noticed(tmp_path: Path) -> None:
     wrong = source.replace("numpy.float32", "numpy.float64").replace("uint32", "uint64")
     assert each.expected != run("python", [each], tmp_path, [wrong])[0]
 
-
-# ---- what is computed only if something holds
 
 BALL: dict[str, Any] = {"v": [[0.5, 0.0]], "y": [[0.0, 1.0]], "dt": 1 / 60, "name": "ball"}
 
@@ -166,17 +154,12 @@ def test_a_force_may_be_another_in_every_step() -> None:
         assert (s.y, m.finish(s, force.ravel().tolist())) == (y.ravel().tolist(), v.ravel().tolist()), k
 
 
-# ---- what is done with bits
-
-
 def test_functions_are_called_by_name() -> None:
     for language in LANGUAGES:
         source = sw.export(Knot(1.1), "standard_euler", language, name="knot").source
         for function in FUNCTIONS:
-            assert len(re.findall(rf"\b(?:knot_|_)?{function}\(", source)) == 2, (
-                language,
-                function,
-            )  # where it is and where it is called
+            # Where it is and where it is called.
+            assert len(re.findall(rf"\b(?:knot_|_)?{function}\(", source)) == 2, (language, function)
     plain = sw.export(sw.Oscillator(), "rk4", "c").source
     assert "turn_sign" not in plain
     assert not any(function in plain for function in FUNCTIONS)
@@ -193,13 +176,8 @@ def test_what_only_looks_like_a_function_is_none() -> None:
         patch.setattr(trig, "CONSTANTS", trig.CONSTANTS._replace(double=of_double))
         rough = trig.sin(x)  # a sine whose argument is reduced by the first part of π alone
     other = trig._half_turn(x, n, x * trig.PER_HALF_TURN)  # one whose sign is turned by another
-    for symbol, function in (
-        (trig.sin(x), "sine"),
-        (trig.cos(x), "cosine"),
-        (log.log(x), "logarithm"),
-        (rough, None),
-        (other, None),
-    ):
+    right = (trig.sin(x), "sine"), (trig.cos(x), "cosine"), (log.log(x), "logarithm")
+    for symbol, function in (*right, (rough, None), (other, None)):
         listed, (root,) = tape.operations([symbol])
         operations = [(name, tuple(of), constant) for name, of, constant in listed]
         for each in FUNCTIONS:
@@ -210,8 +188,6 @@ def test_what_only_looks_like_a_function_is_none() -> None:
             else:
                 assert of is None
 
-
-# ---- what must fail
 
 #: Without a softening, or of two bodies, some sums add a zero.
 BODIES = Journey(
@@ -239,9 +215,6 @@ def test_each_operation_counts(tmp_path: Path) -> None:
         assert not unnoticed
 
 
-# ---- loops
-
-
 def not_own(self: Any, lines: Any) -> bool:
     return len(self._to.get(lines[0], ())) == 1 and all(len(self._to.get(line, ())) == 1 for line in lines)
 
@@ -251,18 +224,21 @@ def too_early(self: Any, i: int, lines: Any) -> int:
     return space(self, i, lines)
 
 
+def lying(n: int) -> tuple[sw.Springs, Any]:
+    """A net just above a floor that is inclined."""
+    return net(n, floor=sw.Floor(restitution=0.3, friction=0.2, normal=(0.0, 0.6, 0.8), offset=-0.05))
+
+
 space = lane_writer.LaneWriter._space
+MISTAKES = [
+    (lanes, "COMMUTATIVE", ("add", "multiply", "subtract")),
+    *((lane_writer.LaneWriter, name, mistake) for name, mistake in (("_is_direct", not_own), ("_space", too_early))),
+]
 
 
 @pytest.mark.mutant
 @pytest.mark.parametrize(
-    ("of", "name", "mistake"),
-    [
-        (lanes, "COMMUTATIVE", ("add", "multiply", "subtract")),
-        (lane_writer.LaneWriter, "_is_direct", not_own),
-        (lane_writer.LaneWriter, "_space", too_early),
-    ],
-    ids=["differences turned round", "results too early", "places used twice"],
+    ("of", "name", "mistake"), MISTAKES, ids=["differences turned round", "results too early", "places used twice"]
 )
 def test_a_mistake_in_lanes_is_noticed(of: Any, name: str, mistake: object, tmp_path: Path, monkeypatch: Any) -> None:
     """In Python, which compiles nothing: another value in some step."""

@@ -1,7 +1,5 @@
 """The files of exported steps: their text, what a compiler says of them, names, and what is refused."""
 
-from __future__ import annotations
-
 import math
 import re
 import subprocess
@@ -15,12 +13,8 @@ from stepwell.source.exports.names import camel, plain, prefix, snake
 from stepwell.views import cli
 from support.abroad import PATIENCE, missing
 from support.export import LANGUAGES
+from support.refusals import refused
 from support.snapshots import Snapshots
-
-WRONG: Any = "yes"
-
-
-# ---- whole files
 
 #: A carry and a table of samples; a control, a force, functions of bits and float32.
 FILES: dict[str, tuple[sw.System, str, dict[str, Any]]] = {
@@ -42,9 +36,6 @@ def test_files_are_what_they_were(name: str, snapshot: Snapshots) -> None:
         snapshot(f"{name}{step.endings[0]}", step.source.replace(f"stepwell {sw.__version__}", "stepwell VERSION"))
 
 
-# ---- the head of a file
-
-
 def test_the_head_says_what_it_is() -> None:
     source = sw.export(sw.NBody([1.0, 2.0], dim=3), "rk4", "c").source
     head = source.partition("\n\n#include")[0]
@@ -62,18 +53,6 @@ def test_the_head_says_what_it_is() -> None:
     assert "(..., fused=True)" in sw.export(sw.Oscillator(), "rk4", "rust", fused=True).source
 
 
-def test_it_reads_as_explain_does() -> None:
-    """Names, order and what is made before the steps are those of the listing."""
-    source = sw.export(sw.Oscillator(), "false_euler", "c").source
-    assert "    m->phi = m->dt * m->omega;\n" in source
-    assert (
-        "    const double next_v = v - m->phi * y;\n    const double dy1 = m->phi * next_v;\n    const double next_y = y + dy1;\n"
-        in source
-    )
-    heun = sw.export(sw.Oscillator(), "standard_heun", "rust").source
-    assert "        let a1 = self.phi * y; // -dv1\n        let dy1 = self.phi * v;\n" in heun
-
-
 def test_what_a_page_needs_is_not_asked_for() -> None:
     """A module for browsers: nothing of Node, and no assignment to what is not declared, which modules refuse."""
     source = sw.export(sw.Oscillator(x=sw.Sampled([1.0, 2.0], 1.0)), "rk4", "javascript").source
@@ -81,8 +60,6 @@ def test_what_a_page_needs_is_not_asked_for() -> None:
     assert not re.search(r"\b(import|require|process|Buffer|globalThis|module)\b", code)
     assert code.count("export ") == 1
 
-
-# ---- what a file refuses
 
 #: Options that compute other numbers, and what the file says of them.
 OTHER_NUMBERS = {
@@ -149,36 +126,21 @@ def test_python_without_a_fused_multiply_add_says_so() -> None:
     if hasattr(math, "fma"):
         exec(source, {})
         return
-    with pytest.raises(ImportError, match=r"oscillator_rk4 needs Python 3\.13, which has a fused multiply-add"):
-        exec(source, {})
+    refused(ImportError, r"oscillator_rk4 needs Python 3\.13, which has a fused multiply-add", exec, source, {})
 
 
 def test_what_is_no_parameter_is_refused_in_python() -> None:
     space: dict[str, Any] = {}
     exec(sw.export(sw.Oscillator(), "rk4", "python").source, space)
     kind = space["OscillatorRk4"]
-    with pytest.raises(TypeError, match="there is no parameter gain"):
-        kind(gain=1.0)
-    with pytest.raises(TypeError, match="there is no parameter step"):
-        kind(step=1.0)
-    with pytest.raises(ValueError, match="velocities: expected 1 number, got 2"):
-        kind().start([0.0, 0.0], [1.0])
-
-
-# ---- names
+    for name in ("gain", "step"):
+        refused(TypeError, f"there is no parameter {name}", kind, **{name: 1.0})
+    refused(ValueError, "velocities: expected 1 number, got 2", kind().start, [0.0, 0.0], [1.0])
 
 
 def test_names_that_languages_take() -> None:
-    assert [plain(name) for name in ("v'[0,1]", "Φ", "x[1].amplitude", "a.omega", "y2[1]", "größe", "2x", "λ")] == [
-        "next_v_0_1",
-        "phi",
-        "x1_amplitude",
-        "a_omega",
-        "y2_1",
-        "groe",
-        "x2x",
-        "lambda",
-    ]
+    names = "v'[0,1]", "Φ", "x[1].amplitude", "a.omega", "y2[1]", "größe", "2x", "λ"
+    assert list(map(plain, names)) == ["next_v_0_1", "phi", "x1_amplitude", "a_omega", "y2_1", "groe", "x2x", "lambda"]
     assert [snake(name) for name in ("NBody", "LinearSystem", "Chain")] == ["n_body", "linear_system", "chain"]
     assert camel("n_body_rk4") == "NBodyRk4"
 
@@ -188,8 +150,7 @@ def test_what_is_no_name() -> None:
         with pytest.raises(sw.errors.ArgumentError, match=rf"name: '{name}' has a meaning of its own"):
             sw.export(sw.Oscillator(), "rk4", "c", name=name)
     for name in ("", "2x", "a b", "a-b", "_a", "ä", "x" * 61, "a;b"):
-        with pytest.raises(sw.errors.ArgumentError, match="name: expected at most 60 letters of English"):
-            prefix(name)
+        refused(sw.errors.ArgumentError, "name: expected at most 60 letters of English", prefix, name)
 
 
 def test_a_text_in_a_comment_ends_nothing() -> None:
@@ -202,9 +163,6 @@ def test_a_text_in_a_comment_ends_nothing() -> None:
         assert "\n int x" not in source
         assert "*/" not in source
         assert not any(line.endswith("\\") for line in source.splitlines())
-
-
-# ---- errors
 
 
 @sw.system(shape=(800,))
@@ -248,8 +206,7 @@ def test_what_cannot_be_exported_says_so(tmp_path: Path) -> None:
             asked = {"language": language, "fused": True} | more
             cases.append((free, "rk4", asked, unsupported, f"fused: {name} has no fused multiply-add"))
     for system, method, options, error, text in cases:
-        with pytest.raises(error, match=text):
-            sw.export(system, method, **{"language": "c"} | options)
+        refused(error, text, sw.export, system, method, **{"language": "c"} | options)
     for path, error, text in (
         (tmp_path / "step.py", wrong, "path: expected a file ending in .c"),
         (tmp_path / "no" / "step.c", wrong, "path: .* can be written"),

@@ -1,7 +1,5 @@
 """What advice predicts, what it refuses, and what it tells."""
 
-from __future__ import annotations
-
 import json
 import math
 import warnings
@@ -18,8 +16,8 @@ from stepwell.studies.advice.costs import Times, single_name
 from stepwell.studies.advice.motion import motion_of
 from stepwell.studies.advice.predict import Rates
 from stepwell.studies.advice.trials import Trials
-from stepwell.views import cli
 from support.advised import _times_are_measured_once, brute_of, scene_of, unmeasured  # noqa: F401
+from support.commands import complaint, listed, printed
 from support.families import family
 from support.looped import assert_refused, looped
 from support.truths import CLOSED_FORMS
@@ -33,9 +31,6 @@ def error_of(scene: Scene, method: str, dt: float, steps: int) -> float:
         return float(scene.state_error(scene.run(method, dt, steps=steps, every=1)).max())
 
 
-# ---- prediction and margin
-
-
 @pytest.mark.usefixtures("unmeasured")
 @pytest.mark.parametrize("name", family(["oscillator", "chain"], lambda name: name == "oscillator"))
 def test_modes_predict_the_error(name: str) -> None:
@@ -47,7 +42,7 @@ def test_modes_predict_the_error(name: str) -> None:
 
 
 @pytest.mark.usefixtures("unmeasured")
-def test_frequency_and_damping_errors_are_those_of_the_series() -> None:
+def test_errors_of_frequency_and_damping_and_methods_that_are_refused() -> None:
     methods = ["false_euler", "semi_false_heun"]
     advice = sw.advise("oscillator", frame=0.1, tolerance=0.9, methods=methods, cost="evaluations")
     rows = {row.method.name: row for row in advice.ranked}
@@ -56,17 +51,20 @@ def test_frequency_and_damping_errors_are_those_of_the_series() -> None:
     assert rows["false_euler"].damping_error == pytest.approx(0.0, abs=1e-12)
     assert rows["semi_false_heun"].frequency_error == pytest.approx(-(0.1**2) / 12 + 7 * 0.1**4 / 160, rel=1e-3)
     assert rows["semi_false_heun"].damping_error == pytest.approx(0.1**4 / 8 / 0.1, rel=1e-3)
-
-
-def test_the_fastest_rate_is_that_of_what_does_not_grow() -> None:
-    rates = Rates(np.array([0.0, 1.0]), np.array([[-1.0 + 2.0j, 5.0], [-3.0, 0.1]]))
-    assert rates.fastest == (-3.0, 1.0)
-    assert Rates(np.array([0.0]), np.array([[1.0 + 0.0j]])).fastest is None
+    advice = sw.advise("forced_oscillator", frame=0.1, tolerance=1e-1)
+    refused = {each.method: each.reason for each in advice.rejected if each.kind == "refused"}
+    assert set(refused) == {m.name for m in sw.methods() if m.needs_acceleration}
+    assert "damping" in refused["verlet"]
+    only = sw.advise("forced_oscillator", tolerance=1e-1, methods=["verlet"])
+    assert only.best is None
+    assert "Nothing fits" in str(only)
 
 
 def test_no_prediction_where_it_makes_no_sense() -> None:
+    rates = Rates(np.array([0.0, 1.0]), np.array([[-1.0 + 2.0j, 5.0], [-3.0, 0.1]]))
+    assert rates.fastest == (-3.0, 1.0)
+    assert Rates(np.array([0.0]), np.array([[1.0 + 0.0j]])).fastest is None
     advice = sw.advise("forced_oscillator", frame=1 / 60, tolerance=0.1, methods=["rk4"])
-    assert advice.best is not None
     assert (advice.best.predicted, advice.best.predicted_by, advice.best.frequency_error) == (None, None, None)
 
 
@@ -92,7 +90,9 @@ def test_the_margin_is_where_it_blows_up(name: str) -> None:
             sizes.append(float(scene.amplitude(run).max()))
         # Near the limit the axes of the ellipse are in the ratio √((2+Φ)/(2−Φ)) < 45; outside e⁷ and more.
         assert sizes[0] < 50
-        assert not sizes[1] < 1e3
+        # Beyond the limit of dopri5 it grows by less.
+        if 20_000 * math.log(float(sw.analyse(scene.system, row.method, dt=1.001 * row.limit).radius)) > 9.0:
+            assert not sizes[1] < 1e3
         tried += 1
     assert tried >= 3
 
@@ -110,17 +110,12 @@ def test_the_observed_limit_is_where_runs_begin_to_grow() -> None:
             assert error_of(scene, row.method.name, scene.horizon / inside, inside) < math.inf
 
 
-# ---- nothing fits, and what is refused
-
-
 def test_nothing_fits_a_budget() -> None:
     advice = sw.advise("oscillator", frame=0.5, tolerance=1e-3, budget=1e-15)
     assert advice.best is None
     assert advice.ranked == ()
     gap = advice.shortfall
-    assert gap is not None
     assert (gap.method, gap.substeps, gap.least_error) == (None, None, math.inf)
-    assert gap.needed_budget is not None
     assert 1e-12 < gap.needed_budget < 1e-3
     assert {each.kind for each in advice.rejected} <= {"budget", "dominated", "inaccurate", "unstable"}
     text = str(advice)
@@ -137,10 +132,8 @@ def test_nothing_meets_the_tolerance() -> None:
     advice = sw.advise("oscillator", frame=0.5, tolerance=1e-17, methods=["rk4", "pefrl"])
     gap = advice.shortfall
     assert advice.best is None
-    assert gap is not None
     assert gap.needed_budget is None
     assert gap.method in ("rk4", "pefrl")
-    assert gap.substeps is not None
     scene = sw.scenes.oscillator()
     steps = math.ceil(scene.horizon / 0.5 - 1e-9) * gap.substeps
     assert error_of(scene, gap.method, 0.5 / gap.substeps, steps) <= 2 * gap.least_error < 1e-9
@@ -155,7 +148,6 @@ def test_the_least_error_is_that_of_a_whole_run(budget: float) -> None:
     options = {"frame": None, "methods": ["fehlberg_5", "merson"], "cost": "evaluations"}
     advice = sw.advise(scene, tolerance=1e-9, budget=budget, **options)
     gap = advice.shortfall
-    assert gap is not None
     assert gap.tolerance is not None
     at = np.linspace(0.0, scene.horizon, 3001)[1:]
     run = sw.integrate(scene.system, gap.method, v=scene.v, y=scene.y, tolerance=gap.tolerance, at=at)
@@ -165,22 +157,10 @@ def test_the_least_error_is_that_of_a_whole_run(budget: float) -> None:
 
 
 @pytest.mark.usefixtures("unmeasured")
-def test_methods_that_the_system_refuses_are_named() -> None:
-    advice = sw.advise("forced_oscillator", frame=0.1, tolerance=1e-1)
-    refused = {each.method: each.reason for each in advice.rejected if each.kind == "refused"}
-    assert set(refused) == {m.name for m in sw.methods() if m.needs_acceleration}
-    assert "damping" in refused["verlet"]
-    only = sw.advise("forced_oscillator", tolerance=1e-1, methods=["verlet"])
-    assert only.best is None
-    assert "Nothing fits" in str(only)
-
-
-@pytest.mark.usefixtures("unmeasured")
 def test_a_choice_whose_neighbours_fail_says_so() -> None:
     """Where errors dip, the row says from where on they stay below the tolerance; all that were tried there do."""
     advice = sw.advise("pendulum", frame=None, tolerance=0.03, cost="evaluations", methods=list(CLOSED_FORMS))
     scene = scene_of("pendulum")
-    assert advice.best is not None
     assert not advice.best.is_robust
     assert "Errors are not even here" in str(advice)
     for row in advice.ranked:
@@ -205,14 +185,11 @@ def test_what_is_wrong_is_said() -> None:
             ({"budget": 0}, ArgumentError, "budget: expected numbers above zero in seconds"),
             ({"methods": "rk4"}, DTypeError, "methods: expected a list of names, got 'rk4'"),
             ({"methods": []}, ArgumentError, "methods: expected at least one, got none"),
-            ({"methods": ["rk5"]}, ArgumentError, "did you mean 'rk4'?"),
+            ({"methods": ["rk44"]}, ArgumentError, "did you mean 'rk4'?"),
             ({"cost": "energy"}, ArgumentError, "Known: time, evaluations"),
             ({"dtype": "float16"}, sw.errors.UnknownNameError, "dtype: there is no 'float16'"),
         )
     )
-
-
-# ---- telling
 
 
 @pytest.mark.usefixtures("unmeasured")
@@ -222,7 +199,6 @@ def test_the_text_fits_a_screen(tmp_path: Any) -> None:
         lines = str(advice).splitlines()
         assert len(lines) <= 26
         assert lines[0].startswith(advice.scene.title)
-        assert advice.best is not None
         assert lines[1].startswith(f"Use {advice.best.method.name} with {advice.best.steps} steps")
         assert advice.best.method.name in repr(advice)
     advice.to_json(tmp_path / "a.json")
@@ -230,49 +206,21 @@ def test_the_text_fits_a_screen(tmp_path: Any) -> None:
     assert json.loads(advice.to_json())["best"]["method"] == advice.best.method.name
 
 
-def run_command(capsys: Any, *words: str) -> tuple[int, str, str]:
-    code = cli.main(list(words))
-    return code, *capsys.readouterr()
-
-
 @pytest.mark.usefixtures("unmeasured")
 def test_the_command_says_what_advise_says(capsys: Any, tmp_path: Any) -> None:
     words = ("advise", "clover", "--frame", "3/10", "--tolerance", "0.01", "--cost", "evaluations")
-    code, out, err = run_command(capsys, *words, "--json")
-    assert (code, err) == (0, "")
-    report, direct = json.loads(out), json.loads(sw.advise("clover", 0.3, 0.01, cost="evaluations").to_json())
-    for key in ("scene", "horizon", "frame", "tolerance", "cost"):
+    report, direct = listed(capsys, *words), json.loads(sw.advise("clover", 0.3, 0.01, cost="evaluations").to_json())
+    for key in ("scene", "horizon", "frame", "tolerance", "cost", "rejected"):
         assert report[key] == direct[key]
-    keys = [
-        "method",
-        "substeps",
-        "dt",
-        "error",
-        "predicted",
-        "evaluations_per_frame",
-        "limit",
-        "observed_limit",
-        "margin",
-        "robust",
-    ]
+    keys = ["method", "substeps", "dt", "error", "predicted", "limit", "observed_limit", "margin", "robust"]
+    keys += ["evaluations_per_frame"]
     assert [[row[k] for k in keys] for row in report["ranked"]] == [[row[k] for k in keys] for row in direct["ranked"]]
-    assert report["rejected"] == direct["rejected"]
-    code, out, err = run_command(capsys, *words, "-o", str(tmp_path / "a.json"))
-    assert (code, err) == (0, "")
+    out = printed(capsys, *words, "-o", str(tmp_path / "a.json"))
     assert f"Use {report['best']['method']} with {report['best']['substeps']} step" in out
     assert "written:" in out
     assert (tmp_path / "a.json").exists()
     for row in report["ranked"]:
         assert row["method"] in out
-
-
-def test_the_command_says_when_nothing_fits(capsys: Any) -> None:
-    code, out, err = run_command(capsys, "advise", "oscillator", "--budget", "1e-15", "--methods", "rk4, leapfrog")
-    assert (code, err) == (0, "")
-    assert "Nothing fits." in out
-    code, out, _ = run_command(capsys, "advise", "oscillator", "--budget", "1e-15", "--methods", "rk4", "--json")
-    assert code == 0
-    assert json.loads(out)["best"] is None
 
 
 @looped(
@@ -283,18 +231,15 @@ def test_the_command_says_when_nothing_fits(capsys: Any) -> None:
         (["advise", "clover", "--frame", "1/0"], "--frame: expected a time"),
         (["advise", "oscillator", "--frame", "1e-12", "-o", "a.json"], "frame: expected at most 1000000 frames in the horizon"),
         (["advise", "clover", "--tolerance", "0"], "tolerance: expected numbers above zero"),
-        (["advise", "clover", "--methods", "rk5"], "did you mean 'rk4'?"),
+        (["advise", "clover", "--methods", "rk44"], "did you mean 'rk4'?"),
         (["advise", "clover", "-o", "a.txt"], "-o: expected a file ending in .json"),
     ],
 )
 def test_the_command_says_what_is_wrong(capsys: Any, words: list[str], message: str) -> None:
-    code, out, err = run_command(capsys, *words)
-    assert (code, out) == (2, "")
-    assert message in err
+    assert message in complaint(capsys, *words)
 
 
 # ---- float32, where it is accurate enough and costs less
-
 FEW = ["leapfrog", "rk4", "pefrl", "dop853"]
 
 #: A point that nothing moves otherwise: v̇ = 0, ẏ = v.
@@ -364,26 +309,26 @@ def test_float32_is_not_advised_where_its_rounding_is_more_than_what_is_wanted(n
     assert {each.dtype for each in rounding} == {"float32"}
     alone = sw.advise(name, None, 1e-9, methods=FEW, dtype="float32")
     assert alone.best is None
-    assert alone.shortfall is not None
     assert alone.shortfall.dtype == "float32"
     assert alone.shortfall.least_error > 2.0**-26
     assert " in float32 with " in str(alone)
 
 
-def test_the_search_ends_where_shorter_steps_only_round_more() -> None:
+def test_the_search_ends_where_shorter_steps_only_round_more_and_nothing_fits(capsys: Any) -> None:
     """Without that it would go on to millions of steps; here the last run has at most four times the steps of the best."""
     free = sw.advise("oscillator", None, 1e-8, methods=["rk4"], dtype="float32")
-    assert free.shortfall is not None
     last = next(each for each in free.rejected if each.method == "rk4")
     assert int(last.reason.split(" with ")[1].split(" steps")[0]) <= 4 * (free.shortfall.substeps or 0)
     assert free.runs < 40
+    words = ("advise", "oscillator", "--budget", "1e-15", "--methods")
+    assert "Nothing fits." in printed(capsys, *words, "rk4, leapfrog")
+    assert listed(capsys, *words, "rk4")["best"] is None
 
 
 def test_float32_is_chosen_where_it_costs_less(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("stepwell.advice.step_times", prices(0.5))
     options: dict[str, Any] = {"frame": 0.1, "tolerance": 0.1, "methods": ["leapfrog", "rk4"], "fixed": True}
     advice = sw.advise("oscillator", **options, dtype="both")
-    assert advice.best is not None
     assert (advice.best.name, advice.best.ns_per_step, advice.best.float64_ns_per_step) == ("leapfrog, float32", 0.5, 1.0)
     wide = next(row for row in advice.ranked if row.name == "leapfrog")
     assert advice.best.seconds_per_frame == pytest.approx(0.5 * (wide.seconds_per_frame or 0.0))
@@ -427,10 +372,8 @@ def test_what_float32_does_not_go_with_is_refused_in_words() -> None:
 
 
 def test_steps_that_round_up_end_after_what_is_known() -> None:
-    """Their last state is not compared with an earlier one, which would be wrong by what the step was rounded by.
-
-    A point moves at a speed of 1, so y = t. Both steps add a number of float32 to itself or to 0, so nothing else is rounded.
-    """
+    """Their last state is not compared with an earlier one, which would be wrong by what the step was rounded by."""
+    # A point moves at a speed of 1, so y = t. Both steps add a number of float32 to itself or to 0, so nothing else is rounded.
     known = Scene(FREE, v=[1.0], y=[0.0], until=0.6, exact=lambda t: (np.ones((len(t), 1)), t[:, np.newaxis]))
     forever = Scene(FREE, v=[1.0], y=[0.0], horizon=0.6, exact=known.exact)
     run = known.run("false_euler", 0.3, steps=2, every=1, dtype="float32")
@@ -445,10 +388,8 @@ def test_steps_that_round_up_end_after_what_is_known() -> None:
 @pytest.mark.usefixtures("unmeasured")
 def test_the_command_tries_both(capsys: Any) -> None:
     words = ["advise", "clover", "--frame", "0.3", "--tolerance", "0.01", "--cost", "evaluations", "--float32"]
-    assert cli.main([*words, "--json"]) == 0
-    report = json.loads(capsys.readouterr().out)
+    report = listed(capsys, *words)
     assert report["dtype"] == "both"
     assert {row["dtype"] for row in report["ranked"]} == {"float64", "float32"}
     assert all((row["float64_error"] is None) == (row["dtype"] == "float64") for row in report["ranked"])
-    assert cli.main(words) == 0
-    assert "rk4, float32" in capsys.readouterr().out
+    assert "rk4, float32" in printed(capsys, *words)

@@ -1,7 +1,5 @@
 """Advice for scenes that it never saw, of any size, and of one's own."""
 
-from __future__ import annotations
-
 import copy
 import functools
 import math
@@ -17,10 +15,11 @@ from stepwell.scenes import Scene
 from support.advised import RATIO, _times_are_measured_once, assert_cheap, assert_true, linear, pendulum, tried, unmeasured  # noqa: F401
 from support.families import family
 from support.looped import assert_refused
+from support.refusals import refused
 
 from benches.advice import Brute
 
-# ---- scenes that this test makes
+pytestmark = pytest.mark.usefixtures("unmeasured")
 
 
 def driven(damping: float, drive: float) -> Scene:
@@ -54,11 +53,6 @@ def stiff_chain() -> Scene:
     return Scene(system, v=[0.0, 0.0, 1.0, 0.0], y=0.1, horizon=8.0)
 
 
-def overdamped() -> Scene:
-    system = sw.Oscillator(50.0, 2.0, form="physical")
-    return Scene(system, v=0.0, y=1.0, horizon=5.0)
-
-
 def jolted() -> Scene:
     """An oscillator whose force jumps."""
     force = sw.Sampled(np.random.default_rng(3).normal(size=10), interval=0.7)
@@ -78,29 +72,21 @@ HELD_OUT = {
     "long ellipse": lambda: sw.scenes.kepler(0.95, 0.3),
     "over the top": lambda: pendulum(2.5, 0.0, 30.0),
     "nearly upright": lambda: pendulum(0.0, 3.1, 30.0),
-    "overdamped": overdamped,
+    "overdamped": lambda: Scene(sw.Oscillator(50.0, 2.0, form="physical"), v=0.0, y=1.0, horizon=5.0),
     "one block": linear,
     "jolted": jolted,
     "controlled": lambda: replace(sw.scenes.clover(), control=sw.EnergyControl(0.3)),
     "four stars": lambda: replace(sw.scenes.plummer(4), horizon=3.0),
 }
 
+TOLERANCES = (5e-2, 2e-3, 3e-5)
 #: Of scenes that take long one tolerance is tried.
 LONG = {
-    "chain of 3": 5e-2,
-    "chain of 15": 2e-3,
-    "unequal chain": 3e-5,
-    "stiff chain": 5e-2,
-    "uneven ellipse": 5e-2,
-    "long ellipse": 3e-5,
-    "over the top": 2e-3,
-    "nearly upright": 5e-2,
-    "one block": 2e-3,
-    "jolted": 2e-3,
-    "controlled": 3e-5,
-    "four stars": 5e-2,
+    5e-2: ("chain of 3", "stiff chain", "uneven ellipse", "nearly upright", "four stars"),
+    2e-3: ("chain of 15", "over the top", "one block", "jolted"),
+    3e-5: ("unequal chain", "long ellipse", "controlled"),
 }
-UNSEEN = {name: (LONG[name],) if name in LONG else (5e-2, 2e-3, 3e-5) for name in HELD_OUT}
+UNSEEN = {name: tuple(each for each in TOLERANCES if name in LONG[each]) or TOLERANCES for name in HELD_OUT}
 
 
 @functools.cache
@@ -108,7 +94,6 @@ def held_out(name: str) -> Brute:
     return Brute(HELD_OUT[name](), None, RATIO)
 
 
-@pytest.mark.usefixtures("unmeasured")
 @pytest.mark.parametrize(("name", "tolerance"), tried(UNSEEN, ("driven", "ellipse", "controlled")))
 def test_the_advice_for_scenes_never_seen_is_true_and_near_the_cheapest(name: str, tolerance: float) -> None:
     brute = held_out(name)
@@ -118,10 +103,9 @@ def test_the_advice_for_scenes_never_seen_is_true_and_near_the_cheapest(name: st
     assert_cheap(brute, advice)
 
 
-FRAMED = {"over the top": lambda: pendulum(2.5, 0.0, 30.0), "ellipse": lambda: sw.scenes.kepler(0.6)}
+FRAMED = {"over the top": HELD_OUT["over the top"], "ellipse": lambda: sw.scenes.kepler(0.6)}
 
 
-@pytest.mark.usefixtures("unmeasured")
 @pytest.mark.parametrize(
     ("name", "frame"),
     family([("over the top", 0.9), ("over the top", 100.0), ("ellipse", 7.3)], lambda name, frame: frame == 0.9),
@@ -136,16 +120,6 @@ def test_frames_that_do_not_divide_the_horizon(name: str, frame: float) -> None:
     assert_cheap(brute, advice)
 
 
-def test_a_motion_that_is_not_known_to_the_end_of_the_first_frame_is_no_scene_to_judge_by() -> None:
-    chaos = replace(sw.scenes.energy_control(), horizon=200.0)
-    with pytest.raises(ArgumentError, match=r"is not known beyond t = .*, within the first frame"):
-        sw.advise(chaos, frame=100.0, tolerance=1e-2, methods=["rk4"])
-
-
-# ---- motions of any size, scenes of one's own
-
-
-@pytest.mark.usefixtures("unmeasured")
 @pytest.mark.parametrize("known", family([True, False], lambda known: known))
 def test_amplitudes_do_not_matter(known: bool) -> None:
     """From 1e-12 to 1e12 the advice is the same, by a formula or by a tight run; for powers of two to the bit."""
@@ -165,7 +139,6 @@ def test_amplitudes_do_not_matter(known: bool) -> None:
             assert ours.error == pytest.approx(theirs.error, rel=1e-6)
 
 
-@pytest.mark.usefixtures("unmeasured")
 @pytest.mark.parametrize("force", [1e-12, 1e-6, 1e9])
 def test_from_rest_under_a_force(force: float) -> None:
     system = sw.Oscillator(1.0, a=sw.Sinusoid(force, 2.0), form="physical")
@@ -205,7 +178,6 @@ def pulsed(begin: float, width: float, horizon: float, v: float, y: float, push:
     return Scene(system, v, y, horizon, exact=exact, name="pulsed")
 
 
-@pytest.mark.usefixtures("unmeasured")
 @pytest.mark.parametrize(
     "scene",
     [
@@ -258,7 +230,37 @@ def test_the_largest_length_of_a_peak_between_two_samples_is_found() -> None:
     assert known.scales[0] == pytest.approx(4.0 * mu / 3.0, rel=0.25)
 
 
-@pytest.mark.usefixtures("unmeasured")
+def test_what_is_no_scene_and_no_exact_solution() -> None:
+    good: dict[str, Any] = {"system": sw.Pendulum(), "v": 0.0, "y": 1.0, "horizon": 10.0}
+    two, controls = sw.Pendulum([1.0, 2.0]), "an EnergyControl, a LengthControl, a NormControl, a Control or a Projection"
+    assert_refused(
+        (lambda wrong=wrong: Scene(**good | wrong), error, message)
+        for wrong, error, message in (
+            ({"system": 3}, DTypeError, "system: expected a stepwell system such as Oscillator(), got int"),
+            ({"v": "fast"}, DTypeError, "v: expected real numbers"),
+            ({"v": [0.0, 1.0]}, ArgumentError, "v: expected shape () of a scene's one member, got (2,)"),
+            ({"y": math.nan}, ArgumentError, "y: expected finite numbers"),
+            ({"system": two}, ArgumentError, "system: expected a system of one member, got parameters of shape (2,)"),
+            ({"horizon": None}, ArgumentError, "horizon: expected the time over which errors are measured, in units of time"),
+            ({"horizon": math.nan}, ArgumentError, "horizon: expected finite numbers in units of time"),
+            ({"horizon": -1.0}, ArgumentError, "horizon: expected numbers above zero"),
+            ({"dt": 0.0}, ArgumentError, "dt: expected numbers above zero"),
+            ({"until": -1.0}, ArgumentError, "until: expected a time of zero or more"),
+            ({"exact": 3.0}, DTypeError, "exact: expected a function of times, or None, got float"),
+            ({"control": "on"}, DTypeError, f"control: expected {controls}, got str"),
+        )
+    )
+    shapes = "exact: expected y of shape (1001,) for 1001 times, got (1001, 2)"
+    assert_refused(
+        (lambda exact=exact: sw.advise(Scene(sw.Pendulum(), 0.0, 1.0, 10.0, exact=exact), frame=None), ArgumentError, message)
+        for exact, message in (
+            (lambda t: (np.cos(t), np.where(t < 3.0, t, np.nan)), "exact: expected finite numbers, got y = nan at t = 3"),
+            (lambda t: np.cos(t)[0], "exact: expected the blocks v and y, arrays of real numbers, got float64"),
+            (lambda t: (np.cos(t), np.zeros((len(t), 2))), shapes),
+        )
+    )
+
+
 def test_jumps_that_last_for_a_moment_are_no_reason_to_advise_nothing() -> None:
     """Errors are relative to the largest velocity, which the motion has between two samples only."""
     scene = Scene(van_der_pol(mu=300.0), v=0.0, y=2.0, horizon=300.0)
@@ -267,7 +269,6 @@ def test_jumps_that_last_for_a_moment_are_no_reason_to_advise_nothing() -> None:
     assert advice.scene.scales[0] == pytest.approx(400.0, rel=0.05)
 
 
-@pytest.mark.usefixtures("unmeasured")
 @pytest.mark.parametrize("scene", [Scene(reaction(), y=[1.0, 0.0, 0.0], horizon=10.0), Scene(van_der_pol(), 0.0, 2.0, 40.0)])
 def test_an_advised_step_is_shorter_than_the_limit_that_is_told(scene: Scene) -> None:
     """By more than the 2.2 % between the steps at which the limit is looked for."""
@@ -279,7 +280,6 @@ def test_an_advised_step_is_shorter_than_the_limit_that_is_told(scene: Scene) ->
         assert row.margin > 1.02
 
 
-@pytest.mark.usefixtures("unmeasured")
 @pytest.mark.parametrize("frame", [None, 0.5])
 def test_an_advised_step_is_shorter_than_the_limit_of_a_linear_system(frame: float | None) -> None:
     """A mode that no error shows: 600 times as fast as the other, and at rest."""
@@ -292,7 +292,6 @@ def test_an_advised_step_is_shorter_than_the_limit_of_a_linear_system(frame: flo
         assert row.limit >= 1.05 * row.dt
 
 
-@pytest.mark.usefixtures("unmeasured")
 @pytest.mark.parametrize("scene", [pulsed(7.3, 0.2, 20.0, 0.1, 0.0, 1.0, 1e-3), pulsed(5.1, 0.25, 16.0, 0.2, 0.0, 2.0, 1e-3)])
 def test_what_is_advised_for_a_large_error_is_advised_for_a_small_one_if_it_is_as_good(scene: Scene) -> None:
     """Or what costs less by the same method; by luck as well, for errors do not fall evenly here."""
@@ -314,12 +313,10 @@ def test_a_scene_that_adaptive_steps_do_not_go_with_needs_an_exact_solution(arou
     else:
         system = sw.Oscillator(1.0, friction=0.1, form="physical")
     scene = Scene(system, v=0.0, y=1.0, horizon=3.0)
-    with pytest.raises(ArgumentError, match=f"exact: needed by unnamed, whose system has {around}, got None"):
-        sw.advise(scene, frame=None)
+    refused(ArgumentError, f"exact: needed by unnamed, whose system has {around}, got None", sw.advise, scene, frame=None)
 
 
-@pytest.mark.usefixtures("unmeasured")
-def test_a_hard_part_does_not_end_what_is_known() -> None:
+def test_neither_a_hard_part_nor_many_frames_end_what_is_known() -> None:
     """A loose tolerance asks for a truth that is a tenth as loose, so it is judged to the end and true there."""
     for scene in (sw.scenes.kepler(0.95), sw.scenes.pendulum(179.0)):
         unknown = replace(scene, exact=None)
@@ -328,9 +325,11 @@ def test_a_hard_part_does_not_end_what_is_known() -> None:
         assert advice.scene.horizon == scene.horizon
         for row in advice.ranked:
             assert scene.state_error(advice.run(row)).max() <= 1e-1, (scene, row)
+    # Runs of all methods use up what a search may spend, and what was run already is no further run.
+    advice = sw.advise("oscillator", frame=1e-4, tolerance=1e-2, cost="evaluations", fixed=True)
+    assert advice.best.substeps == 1
 
 
-@pytest.mark.usefixtures("unmeasured")
 def test_a_row_with_a_tolerance_is_true_whenever_it_is_asked() -> None:
     """Asked for the end alone, for a few times or for thousands: one run."""
     scene = sw.scenes.kepler(0.3)
@@ -346,46 +345,7 @@ def test_a_row_with_a_tolerance_is_true_whenever_it_is_asked() -> None:
                 assert scene.state_error(run).max() <= tolerance
 
 
-def test_what_is_no_scene() -> None:
-    good: dict[str, Any] = {"system": sw.Pendulum(), "v": 0.0, "y": 1.0, "horizon": 10.0}
-    two, controls = sw.Pendulum([1.0, 2.0]), "an EnergyControl, a LengthControl, a NormControl, a Control or a Projection"
-    assert_refused(
-        (lambda wrong=wrong: Scene(**good | wrong), error, message)
-        for wrong, error, message in (
-            ({"system": 3}, DTypeError, "system: expected a stepwell system such as Oscillator(), got int"),
-            ({"v": "fast"}, DTypeError, "v: expected real numbers"),
-            ({"v": [0.0, 1.0]}, ArgumentError, "v: expected shape () of a scene's one member, got (2,)"),
-            ({"y": math.nan}, ArgumentError, "y: expected finite numbers"),
-            ({"system": two}, ArgumentError, "system: expected a system of one member, got parameters of shape (2,)"),
-            (
-                {"horizon": None},
-                ArgumentError,
-                "horizon: expected the time over which errors are measured, in units of time, got",
-            ),
-            ({"horizon": math.nan}, ArgumentError, "horizon: expected finite numbers in units of time"),
-            ({"horizon": -1.0}, ArgumentError, "horizon: expected numbers above zero"),
-            ({"dt": 0.0}, ArgumentError, "dt: expected numbers above zero"),
-            ({"until": -1.0}, ArgumentError, "until: expected a time of zero or more"),
-            ({"exact": 3.0}, DTypeError, "exact: expected a function of times, or None, got float"),
-            ({"control": "on"}, DTypeError, f"control: expected {controls}, got str"),
-        )
-    )
-
-
-def test_what_is_no_exact_solution() -> None:
-    shapes = "exact: expected y of shape (1001,) for 1001 times, got (1001, 2)"
-    assert_refused(
-        (lambda exact=exact: sw.advise(Scene(sw.Pendulum(), 0.0, 1.0, 10.0, exact=exact), frame=None), ArgumentError, message)
-        for exact, message in (
-            (lambda t: (np.cos(t), np.where(t < 3.0, t, np.nan)), "exact: expected finite numbers, got y = nan at t = 3"),
-            (lambda t: np.cos(t)[0], "exact: expected the blocks v and y, arrays of real numbers, got float64"),
-            (lambda t: (np.cos(t), np.zeros((len(t), 2))), shapes),
-        )
-    )
-
-
-@pytest.mark.usefixtures("unmeasured")
-def test_a_scene_needs_three_things_beside_its_system() -> None:
+def test_a_scene_needs_three_things_and_goes_through_a_file() -> None:
     """Numbers and lists for blocks, and all else by itself; ``until`` says how far if ``horizon`` does not."""
     scene = sw.Scene(sw.Chain(3), v=0, y=[0.0, 1, 0], until=20)
     assert (scene.v.shape, scene.y.shape, scene.horizon, scene.dt) == ((3,), (3,), 20.0, 0.02)
@@ -394,31 +354,7 @@ def test_a_scene_needs_three_things_beside_its_system() -> None:
     assert advice.best is not None
     assert not advice.cut
     at_rest = sw.advise(Scene(sw.Chain(3), v=0, y=0, horizon=20.0), frame=None, methods=["leapfrog", "merson"])
-    assert at_rest.best is not None
     assert at_rest.best.error == 0.0
-
-
-def test_what_is_too_large_or_too_long_is_refused_at_once() -> None:
-    large = Scene(sw.NBody(np.ones(30_000), force="newton", dim=2), v=0.0, y=1.0, horizon=1.0)
-    with pytest.raises(ArgumentError, match="scene: expected a state of at most 100000 numbers, got one of 120000"):
-        sw.advise(large)
-    with pytest.raises(ArgumentError, match=r"frame: expected at most 100 times the horizon of 62\.83.* got 1e\+09"):
-        sw.advise("oscillator", frame=1e9)
-    for frame in (2e-5, 1e-9, 1e-300):
-        with pytest.raises(sw.errors.TooLargeError, match=r"frame: expected at most 1000000 frames .* units of time"):
-            sw.advise("oscillator", frame=frame)
-
-
-@pytest.mark.usefixtures("unmeasured")
-def test_what_is_good_enough_in_the_longest_steps_is_advised_however_many_frames_there_are() -> None:
-    """Runs of all methods use up what a search may spend, and what was run already is no further run."""
-    advice = sw.advise("oscillator", frame=1e-4, tolerance=1e-2, cost="evaluations", fixed=True)
-    assert advice.best is not None
-    assert advice.best.substeps == 1
-
-
-@pytest.mark.usefixtures("unmeasured")
-def test_scenes_and_advice_go_through_a_file() -> None:
     for scene in sw.scenes.scenes():
         for other in (pickle.loads(pickle.dumps(scene)), copy.copy(scene), copy.deepcopy(scene)):
             assert other == scene
@@ -432,3 +368,16 @@ def test_scenes_and_advice_go_through_a_file() -> None:
             assert hash(other) == hash(advice)
             assert str(other) == str(advice)
             assert np.array_equal(other.run().y, advice.run().y)
+
+
+def test_what_is_too_large_too_long_or_not_known_is_refused_at_once() -> None:
+    large = Scene(sw.NBody(np.ones(30_000), force="newton", dim=2), v=0.0, y=1.0, horizon=1.0)
+    refused(ArgumentError, "scene: expected a state of at most 100000 numbers, got one of 120000", sw.advise, large)
+    with pytest.raises(ArgumentError, match=r"frame: expected at most 100 times the horizon of 62\.83.* got 1e\+09"):
+        sw.advise("oscillator", frame=1e9)
+    for frame in (2e-5, 1e-9, 1e-300):
+        with pytest.raises(sw.errors.TooLargeError, match=r"frame: expected at most 1000000 frames .* units of time"):
+            sw.advise("oscillator", frame=frame)
+    chaos = replace(sw.scenes.energy_control(), horizon=200.0)
+    with pytest.raises(ArgumentError, match=r"is not known beyond t = .*, within the first frame"):
+        sw.advise(chaos, frame=100.0, tolerance=1e-2, methods=["rk4"])

@@ -1,7 +1,5 @@
 """Sweeps: axes, what is kept of each member, and that it does not depend on how members are divided."""
 
-from __future__ import annotations
-
 import multiprocessing
 import pickle
 import re
@@ -26,6 +24,7 @@ from stepwell.studies.sweeps.axes import Chunk
 from stepwell.studies.sweeps.ensemble import _outcomes
 from stepwell.studies.sweeps.task import Task
 from support.looped import assert_refused, looped
+from support.refusals import refused
 from support.sweeping import AXES, OUTCOMES, Pickling, duffing, small, unlike
 
 Oscillator = sw.Oscillator
@@ -33,9 +32,6 @@ Oscillator = sw.Oscillator
 WITH_FLOAT32 = tuple(each for each in OUTCOMES if each != "lyapunov")
 
 each_type = looped("dtype", ["float64", "float32"])
-
-
-# ---- axes
 
 
 def test_a_product_is_what_integrate_gives() -> None:
@@ -52,7 +48,7 @@ def test_a_product_is_what_integrate_gives() -> None:
     assert float(one.y_last) == float(alone.y[-1])
 
 
-def test_axes_of_one_dimension_vary_together() -> None:
+def test_axes_of_one_and_of_two_dimensions() -> None:
     omega, y, d = np.array([1.0, 2.0, 3.0]), np.array([0.5, 0.6, 0.7]), np.array([0.0, 0.1])
     axes = {"omega": ("run", omega), "y": ("run", y), "damping": d}
     dataset = sw.sweep(Oscillator, axes, "rk4", v=0.0, dt=0.1, steps=10)
@@ -62,9 +58,6 @@ def test_axes_of_one_dimension_vary_together() -> None:
         for j in range(2):
             run = sw.integrate(Oscillator(omega[i], d[j]), "rk4", v=0.0, y=y[i], dt=0.1, steps=10)
             assert float(dataset.y_last[i, j]) == float(run.y[-1])
-
-
-def test_axes_of_xarray_and_of_two_dimensions() -> None:
     values = xarray.DataArray([[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]], dims=("a", "b"), attrs={"units": "1/s"})
     dataset = sw.sweep(Oscillator, {"y": ("b", [0.1, 0.2, 0.3]), "omega": values}, "rk4", v=0.0, dt=0.1, steps=10, chunk=2)
     assert dataset.y_last.dims == ("b", "a")
@@ -73,7 +66,7 @@ def test_axes_of_xarray_and_of_two_dimensions() -> None:
     np.testing.assert_array_equal(dataset.y_last.transpose("a", "b"), run.y[-1])
 
 
-def test_blocks_with_axes_of_their_own() -> None:
+def test_blocks_and_forces_with_axes_of_their_own() -> None:
     """Batch axes come last, in axes as everywhere; results have them first, as labelled arrays have."""
     scene = sw.scenes.figure_eight()
     factor = np.array([0.9, 1.0, 1.1, 1.2])
@@ -85,6 +78,10 @@ def test_blocks_with_axes_of_their_own() -> None:
     np.testing.assert_array_equal(dataset.y, np.moveaxis(run.y, -1, 0))
     np.testing.assert_array_equal(dataset.t, run.t)
     np.testing.assert_array_equal(dataset.v_start, np.moveaxis(scene.v[..., None] * factor, -1, 0))
+    force = np.array([0.0, 0.5, 1.0])
+    dataset = sw.sweep(sw.Pendulum(), {"force": ("push", force)}, "rk4", v=0.0, y=1.0, dt=0.1, steps=30, chunk=2)
+    run = sw.integrate(sw.Pendulum(), "rk4", v=0.0, y=1.0, dt=0.1, steps=30, force=force)
+    np.testing.assert_array_equal(dataset.y_last, run.y[-1])
 
 
 @each_type
@@ -101,13 +98,6 @@ def test_a_step_as_an_axis(method: str, dtype: Any) -> None:
         np.testing.assert_array_equal(dataset.y[i], run.y[[7, 23, 39, 47]].T)
         np.testing.assert_array_equal(dataset.v[i], run.v[[7, 23, 39, 47]].T)
         np.testing.assert_array_equal(dataset.t[i], run.t[[7, 23, 39, 47]])
-
-
-def test_a_force_as_an_axis() -> None:
-    force = np.array([0.0, 0.5, 1.0])
-    dataset = sw.sweep(sw.Pendulum(), {"force": ("push", force)}, "rk4", v=0.0, y=1.0, dt=0.1, steps=30, chunk=2)
-    run = sw.integrate(sw.Pendulum(), "rk4", v=0.0, y=1.0, dt=0.1, steps=30, force=force)
-    np.testing.assert_array_equal(dataset.y_last, run.y[-1])
 
 
 @looped("shape", [(7,), (3, 5), (2, 3, 4), (1, 6, 1)])
@@ -127,7 +117,7 @@ def test_chunks_are_all_members_in_their_order(shape: tuple[int, ...], of_dt: in
             assert all(chunk.shape[0] == 1 for chunk in chunks)
 
 
-def test_random_samples_have_a_seed() -> None:
+def test_random_samples_have_a_seed_and_sobol_fills_the_box_evenly() -> None:
     one, same, other = (sw.sweeps.random("sample", 4096, seed=s, omega=(1.0, 3.0), y=(-1.0, 1.0)) for s in (1, 1, 2))
     np.testing.assert_array_equal(one["omega"][1], same["omega"][1])
     assert (one["omega"][1] != other["omega"][1]).all()
@@ -140,10 +130,7 @@ def test_random_samples_have_a_seed() -> None:
     assert "seed 1" in dataset.omega.attrs["sampling"]
     run = sw.integrate(Oscillator(one["omega"][1]), "rk4", v=0.0, y=one["y"][1], dt=0.1, steps=10)
     np.testing.assert_array_equal(dataset.y_last, run.y[-1])
-
-
-def test_sobol_fills_the_box_evenly() -> None:
-    """Each of 2ᵏ equal intervals of each argument has as many points; random samples do not."""
+    # Each of 2ᵏ equal intervals of each argument has as many points; random samples do not.
     axes = sw.sweeps.sobol("sample", 256, seed=3, omega=(1.0, 3.0), y=scipy.stats.norm(0.0, 2.0))
     for name, unit in (("omega", (axes["omega"][1] - 1.0) / 2.0), ("y", scipy.stats.norm.cdf(axes["y"][1] / 2.0))):
         assert (np.histogram(unit, 16, (0.0, 1.0))[0] == 16).all(), name
@@ -154,9 +141,6 @@ def test_sobol_fills_the_box_evenly() -> None:
     assert (np.histogram(drawn, 16, (1.0, 3.0))[0] != 16).any()
     with pytest.raises(ArgumentError, match="count: expected a power of two for Sobol's sequence, got 100; 128 is one"):
         sw.sweeps.sobol("sample", 100, seed=3, omega=(1.0, 3.0))
-
-
-# ---- the same bits
 
 
 @looped("dtype", ["float64", "float32"])
@@ -178,14 +162,11 @@ def test_every_division_gives_the_same_bits(dtype: Any) -> None:
         assert one.attrs == other.attrs, division
 
 
-def test_a_bit_that_differs_has_another_hash() -> None:
+def test_samples_in_every_division() -> None:
     hashes = {
         small(outcomes="last", steps=3, y=y, axes={"gamma": [0.1, 0.2]}).attrs["bits"] for y in (1.0, np.nextafter(1.0, 2.0))
     }
     assert len(hashes) == 2
-
-
-def test_samples_in_every_division() -> None:
     for axes in (
         sw.sweeps.random("sample", 64, seed=1, gamma=(0.1, 0.6), y=(-1.0, 1.0)),
         sw.sweeps.sobol("sample", 64, seed=1, gamma=(0.1, 0.6), y=(-1.0, 1.0)),
@@ -211,8 +192,6 @@ def test_a_sum_in_another_order_would_be_noticed(monkeypatch: pytest.MonkeyPatch
 
 
 # ---- engines; those of other processes are in tests/outer/test_sweep_engines.py
-
-
 def test_executors_give_the_same_bits() -> None:
     whole = small()
     with ThreadPoolExecutor(3) as pool:
@@ -222,7 +201,7 @@ def test_executors_give_the_same_bits() -> None:
             assert dataset.attrs == whole.attrs, engine
 
 
-def test_what_happens_in_another_process_is_told_here() -> None:
+def test_what_happens_in_another_process_or_cannot_travel_is_told_here() -> None:
     def wrong(run: sw.Run) -> Any:
         return run.y[-1, :1].reshape(1, 1, 1)[0, 0, 0]
 
@@ -233,6 +212,14 @@ def test_what_happens_in_another_process_is_told_here() -> None:
             small(engine=engine, outcomes=wrong)
     with pytest.warns(sw.DivergenceWarning, match=r"1 of 2 members diverged, that at omega = 30"):
         sw.sweep(sw.Oscillator, {"omega": [1.0, 30.0]}, "rk4", v=0.0, y=1.0, dt=0.2, steps=500, engine=Pickling())
+    lock = multiprocessing.get_context("spawn").Lock()
+
+    def locked(run: sw.Run) -> Any:
+        with lock:
+            return run.y[-1]
+
+    with pytest.raises((ArgumentError, RuntimeError), match=r"engine: the system and the outcomes must be pickled|shared"):
+        small(engine=Pickling(), outcomes=locked)
 
 
 def test_equations_that_are_written_in_a_function() -> None:
@@ -247,8 +234,7 @@ def test_equations_that_are_written_in_a_function() -> None:
     def energy(v: Any, y: Any) -> Any:
         return 0.5 * v**2 - 0.5 * y**2 + 0.25 * y**4
 
-    with pytest.raises(ArgumentError, match="an own system is pickled by the name of its function"):
-        pickle.dumps(local)
+    refused(ArgumentError, "an own system is pickled by the name of its function", pickle.dumps, local)
     datasets = [
         sw.sweep(
             local, AXES, "rk4", v=0.0, dt=0.05, steps=100, outcomes=["last", sw.sweeps.Mean("energy")], engine=engine, chunk=5
@@ -283,17 +269,6 @@ def test_kernels_are_compiled_once_a_worker() -> None:
     assert portable._task(package) is portable._task(bytes(bytearray(package)))
 
 
-def test_what_cannot_travel_is_told() -> None:
-    lock = multiprocessing.get_context("spawn").Lock()
-
-    def locked(run: sw.Run) -> Any:
-        with lock:
-            return run.y[-1]
-
-    with pytest.raises((ArgumentError, RuntimeError), match=r"engine: the system and the outcomes must be pickled|shared"):
-        small(engine=Pickling(), outcomes=locked)
-
-
 def test_memory_is_bounded() -> None:
     """The trajectories are 64 MB; a chunk may take 2 MiB."""
     members, steps, memory = 2000, 2000, 2 * 2**20
@@ -312,23 +287,16 @@ def test_memory_is_bounded() -> None:
         tracemalloc.stop()
 
 
-# ---- what is told of it
-
-
-def test_attributes_tell_how_it_was_made() -> None:
+def test_attributes_tell_how_it_was_made_and_progress_is_shown(monkeypatch: pytest.MonkeyPatch) -> None:
     data = small(units={"t": "s", "y": "m", "gamma": "m/s²", "y_period": "h"})
     attrs = data.attrs
-    assert attrs["stepwell_version"] == sw.__version__
-    assert attrs["numpy_version"] == np.__version__
+    assert (attrs["stepwell_version"], attrs["numpy_version"]) == (sw.__version__, np.__version__)
     assert (attrs["method"], attrs["dt"], attrs["steps"], attrs["transient"], attrs["t0"]) == ("rk4", 0.05, 80, 10, 0.0)
     assert attrs["title"] == "duffing by Runge-Kutta 4: a sweep of 45 members"
     assert data.y_last.attrs["units"] == data.y0.attrs["units"] == "m"
     assert (data.y_crossing.attrs["units"], data.y_period.attrs["units"], data.gamma.attrs["units"]) == ("s", "h", "m/s²")
     assert "units" not in data.v_last.attrs
     assert data.y0.attrs["argument"] == "y"
-
-
-def test_progress_is_shown(monkeypatch: pytest.MonkeyPatch) -> None:
     import contextlib
 
     from stepwell.base import progress
@@ -347,18 +315,8 @@ def test_progress_is_shown(monkeypatch: pytest.MonkeyPatch) -> None:
     assert len(shares) >= 4
 
 
-# ---- what is refused
-
-
-GOOD: dict[str, Any] = {
-    "system": Oscillator,
-    "axes": {"omega": [1.0, 2.0]},
-    "method": "rk4",
-    "v": 0.0,
-    "y": 1.0,
-    "dt": 0.1,
-    "steps": 10,
-}
+GOOD: dict[str, Any] = {"system": Oscillator, "axes": {"omega": [1.0, 2.0]}, "method": "rk4", "v": 0.0, "y": 1.0}
+GOOD |= {"dt": 0.1, "steps": 10}
 REFUSED: dict[str, tuple[dict[str, Any], str]] = {
     "no axes": ({"axes": {}}, "axes: expected at least one, such as {'mu': ('mu', values)}, got none; for one run use integrate"),
     "axes as a list": ({"axes": [1.0]}, "axes: expected a dictionary of arguments by name"),
@@ -399,8 +357,7 @@ REFUSED: dict[str, tuple[dict[str, Any], str]] = {
 @looped("what", REFUSED)
 def test_what_is_refused(what: str) -> None:
     wrong, message = REFUSED[what]
-    with pytest.raises((sw.StepwellError, TypeError), match=re.escape(message)):
-        sw.sweep(**(GOOD | wrong))
+    refused((sw.StepwellError, TypeError), re.escape(message), sw.sweep, **(GOOD | wrong))
 
 
 def test_what_does_not_go_with_float32_is_said_before_any_work() -> None:
@@ -420,7 +377,7 @@ def test_what_does_not_go_with_float32_is_said_before_any_work() -> None:
     )
 
 
-def test_a_component_must_be_given_where_there_are_several() -> None:
+def test_a_component_must_be_given_and_a_package_be_there(monkeypatch: pytest.MonkeyPatch) -> None:
     scene = sw.scenes.figure_eight()
     axes = {"v": ("speed", scene.v[..., None] * np.ones(2))}
     with pytest.raises(ArgumentError, match=re.escape("of: expected one number for each member, such as ('y', 0, 0)")):
@@ -431,24 +388,18 @@ def test_a_component_must_be_given_where_there_are_several() -> None:
     run = sw.integrate(scene.system, "leapfrog", v=scene.v, y=scene.y, dt=0.01, steps=300, every=1)
     k = int(np.flatnonzero(np.diff(np.sign(run.y[:, 0, 0] - 0.5)))[0])
     assert run.t[k] <= float(dataset.y_0_0_crossing[0]) <= run.t[k + 1]
-
-
-def test_a_package_that_is_missing(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "xarray", None)
     with pytest.raises(UnsupportedError, match=re.escape("sweep: needs the package xarray, which is missing (")) as caught:
         sw.sweep(**GOOD)
     assert 'pip install "stepwell[sweep]"' in str(caught.value)
 
 
-def test_importing_stepwell_imports_nothing_of_this() -> None:
+def test_importing_stepwell_imports_nothing_of_this_and_filters_of_warnings_stay() -> None:
     code = (
         "import sys, stepwell as sw; print(*[m for m in sys.modules if m.split('.')[0] in ('xarray', 'zarr', 'dask', 'pandas')], "
     )
     code += "*[m for m in sys.modules if m.startswith('stepwell.studies.sweeps')])"
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split() == []
-
-
-def test_filters_of_warnings_are_as_before() -> None:
     before = list(warnings.filters)
     small(chunk=4, threads=4, outcomes="last")
     assert list(warnings.filters) == before

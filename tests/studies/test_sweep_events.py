@@ -1,7 +1,5 @@
 """Sweeps with events: how often, when first, when a member stopped; in any chunks and processes, from a store."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 
@@ -56,38 +54,17 @@ def test_chunks_processes_and_stores_have_the_same_bits(steps: dict[str, Any], t
         return str(dataset.attrs["bits"])
 
     expected = bits()
-    assert bits(chunk=4, threads=2) == expected
-    assert bits(chunk=5, store=tmp_path / "sweep.zarr") == expected
+    assert (bits(chunk=4, threads=2), bits(chunk=5, store=tmp_path / "sweep.zarr")) == (expected, expected)
     assert bits(chunk=5, engine=Pickling()) == expected
 
 
-def test_another_event_is_another_sweep(tmp_path: Path) -> None:
+def test_what_does_not_go_is_refused_in_words(tmp_path: Path) -> None:
     """A store is not gone on with if an event has other instructions."""
     options: dict[str, Any] = {"v": 0.0, "dt": 0.01, "steps": 100, "store": tmp_path / "sweep.zarr"}
     sw.sweep(ball, AXES, "rk4", events=GROUND, **options)
     other = sw.Event(lambda t, v, y: y, direction=-1, then=lambda t, v, y: (-0.5 * v, y), name="ground")
     with pytest.raises(sw.errors.ArgumentError, match="store"):
         sw.sweep(ball, AXES, "rk4", events=other, **options)
-
-
-def test_a_function_sees_the_events_of_its_run() -> None:
-    def second(run: sw.Run) -> Any:
-        return np.array([run.events["ground"].of(i).t[1] for i in range(run.status.size)])
-
-    dataset = sw.sweep(ball, AXES, "rk4", v=0.0, dt=0.01, steps=300, events=GROUND, outcomes=second)
-    fall = np.sqrt(2.0 * HEIGHT / GRAVITY)
-    np.testing.assert_allclose(dataset.second, fall * (1.0 + 2.0 * E[:, np.newaxis]), rtol=1e-12)
-
-
-def test_members_that_an_event_stops_are_told_by_their_status_without_a_warning() -> None:
-    """And those that diverge with one."""
-    stop = sw.Event(lambda t, v, y: y, direction=-1, terminal=True, name="ground")
-    dataset = sw.sweep(ball, AXES, "rk4", v=0.0, dt=0.01, steps=300, events=stop)
-    assert (dataset.status == int(sw.Status.EVENT)).all()
-    np.testing.assert_allclose(dataset.stopped_at, np.broadcast_to(np.sqrt(2.0 * HEIGHT / GRAVITY), (9, 3)), rtol=1e-12)
-
-
-def test_what_does_not_go_is_refused_in_words() -> None:
     fixed: dict[str, Any] = {"v": 0.0, "dt": 0.01, "steps": 10}
     with pytest.raises(sw.errors.UnsupportedError, match="transient: goes without events="):
         sw.sweep(ball, AXES, "rk4", events=GROUND, transient=10, **fixed)
@@ -95,3 +72,17 @@ def test_what_does_not_go_is_refused_in_words() -> None:
         sw.sweep(ball, AXES, "rk4", events=GROUND, outcomes="lyapunov", **fixed)
     with pytest.raises(sw.errors.ArgumentError, match="events: expected names that results can have, got '<lambda>'"):
         sw.sweep(ball, AXES, "rk4", events=lambda t, v, y: y, **fixed)
+
+
+def test_a_function_sees_the_events_of_its_run_and_status_tells_who_was_stopped() -> None:
+    def second(run: sw.Run) -> Any:
+        return np.array([run.events["ground"].of(i).t[1] for i in range(run.status.size)])
+
+    dataset = sw.sweep(ball, AXES, "rk4", v=0.0, dt=0.01, steps=300, events=GROUND, outcomes=second)
+    fall = np.sqrt(2.0 * HEIGHT / GRAVITY)
+    np.testing.assert_allclose(dataset.second, fall * (1.0 + 2.0 * E[:, np.newaxis]), rtol=1e-12)
+    # And those that diverge with one.
+    stop = sw.Event(lambda t, v, y: y, direction=-1, terminal=True, name="ground")
+    dataset = sw.sweep(ball, AXES, "rk4", v=0.0, dt=0.01, steps=300, events=stop)
+    assert (dataset.status == int(sw.Status.EVENT)).all()
+    np.testing.assert_allclose(dataset.stopped_at, np.broadcast_to(np.sqrt(2.0 * HEIGHT / GRAVITY), (9, 3)), rtol=1e-12)

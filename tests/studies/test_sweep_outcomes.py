@@ -1,7 +1,5 @@
 """What a sweep keeps of each member: extremes, means, crossings, periods, exponents, histories, functions."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np
@@ -11,6 +9,7 @@ from stepwell.errors import ArgumentError
 from stepwell.studies.sweeps import crossings, observed
 from stepwell.studies.sweeps.task import Stopped
 from support.looped import looped
+from support.refusals import refused
 from support.sweeping import AXES, duffing, ends, power, small
 
 Oscillator = sw.Oscillator
@@ -28,11 +27,19 @@ def whole(**options: Any) -> tuple[Any, sw.Run]:
     return dataset, sw.integrate(duffing(gamma=gamma), "rk4", steps=400, every=1, resume=start)
 
 
-def test_extremes() -> None:
+def test_extremes_and_means_of_a_closed_form() -> None:
     dataset, run = whole(outcomes=["extremes", sw.sweeps.Extremes("energy"), sw.sweeps.Extremes(power)])
     for name, values in {"v": run.v, "y": run.y, "energy": run.quantity("energy"), "power": run.v * run.y}.items():
         np.testing.assert_array_equal(dataset[f"{name}_min"], values.min(axis=0))
         np.testing.assert_array_equal(dataset[f"{name}_max"], values.max(axis=0))
+    # The mean of cos² over a period is 1/2; the trapezoidal rule over whole periods has no error but RK4's.
+    steps = 200
+    axes = {"y": ("y0", [1.0, 2.0])}
+    of = sw.sweeps.Mean(lambda t, v, y: y * y, name="square")
+    dataset = sw.sweep(Oscillator(1.0), axes, "rk4", v=0.0, dt=2 * np.pi / steps, steps=steps, outcomes=of)
+    # RK4 errs by Φ⁵/120 a step, so y by 2π·Φ⁴/120 after a period, and y² by twice that, times the amplitude squared.
+    bound = 2 * 2 * np.pi * (2 * np.pi / steps) ** 4 / 120
+    np.testing.assert_allclose(dataset.square_mean, [0.5, 2.0], rtol=2 * bound)
 
 
 @looped("observe", [1, 7, 400])
@@ -85,17 +92,6 @@ def test_what_is_found_of_states_of_float32_is_computed_in_float64() -> None:
     assert (mean_of(run.t, (run.v * run.y).astype(np.float64)) != dataset.power_mean).any()
 
 
-def test_means_of_a_closed_form() -> None:
-    """The mean of cos² over a period is 1/2; the trapezoidal rule over whole periods has no error but RK4's."""
-    steps = 200
-    axes = {"y": ("y0", [1.0, 2.0])}
-    of = sw.sweeps.Mean(lambda t, v, y: y * y, name="square")
-    dataset = sw.sweep(Oscillator(1.0), axes, "rk4", v=0.0, dt=2 * np.pi / steps, steps=steps, outcomes=of)
-    # RK4 errs by Φ⁵/120 a step, so y by 2π·Φ⁴/120 after a period, and y² by twice that, times the amplitude squared.
-    bound = 2 * 2 * np.pi * (2 * np.pi / steps) ** 4 / 120
-    np.testing.assert_allclose(dataset.square_mean, [0.5, 2.0], rtol=2 * bound)
-
-
 def crossing_errors(steps: int, **options: Any) -> Any:
     """By how much the time errs at which cos(ωt) falls to 1/2, for some ω; and the bound."""
     omega = np.array([1.0, 1.3, 1.7])
@@ -117,20 +113,16 @@ def test_first_crossings_are_those_of_the_exact_motion(steps: int) -> None:
 
 
 @pytest.mark.mutant
-def test_linear_crossings_would_be_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_linear_crossings_and_slopes_of_the_wrong_sign_would_be_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(crossings, "rates", lambda *_: None)
     errors, bound = crossing_errors(40)
     assert (errors > 10 * bound).all()
-
-
-@pytest.mark.mutant
-def test_slopes_of_the_wrong_sign_would_be_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(crossings, "rates", lambda *arguments: -np.asarray(observed.rates(*arguments)))
     errors, bound = crossing_errors(40)
     assert (errors > 10 * bound).any()
 
 
-def test_crossings_of_other_quantities_are_linear() -> None:
+def test_crossings_of_other_quantities_are_linear_and_those_of_float32_between_states() -> None:
     """Of a function: (interval)²/8 · largest curvature / speed."""
     omega, h = np.array([1.0, 1.7]), 0.02
     of = sw.sweeps.Crossing(lambda t, v, y: y, 0.5, "falling", name="first")
@@ -138,13 +130,8 @@ def test_crossings_of_other_quantities_are_linear() -> None:
     errors = abs(dataset.first_crossing.values - np.pi / 3 / omega)
     assert (errors < 1.01 * h**2 / 8 * omega**2 / (omega * np.sin(np.pi / 3))).all()
     assert (errors > 1e-7).any()
-
-
-def test_a_crossing_is_found_between_states_of_float32() -> None:
-    """A quarter of a period. Each step rounds y by 2^-25 a few times, ten at most, and where it passes 0 its slope is 1.
-
-    Between states the cubic is wrong by h⁴/384, 3e-7 with h = 0.1; in float32 numbers near 1.57 are 1.2e-7 apart.
-    """
+    # A quarter of a period. Each step rounds y by 2^-25 a few times, ten at most, and where it passes 0 its slope is 1.
+    # Between states the cubic is wrong by h⁴/384, 3e-7 with h = 0.1; in float32 numbers near 1.57 are 1.2e-7 apart.
     steps, h = 20, 0.1
     crossing = sw.sweeps.Crossing("y", direction="falling")
     arguments: dict[str, Any] = {"v": 0.0, "y": 1.0, "dt": h, "steps": steps, "outcomes": crossing, "dtype": "float32"}
@@ -156,7 +143,7 @@ def test_a_crossing_is_found_between_states_of_float32() -> None:
     assert run.t[after - 1] < dataset.y_crossing.values[0] < run.t[after]
 
 
-def test_directions_and_what_never_passes() -> None:
+def test_directions_what_never_passes_and_what_passes_at_a_state() -> None:
     outcomes = [sw.sweeps.Crossing("y", 0.5, d, name=d) for d in ("falling", "rising", "both")]
     dataset = sw.sweep(Oscillator(1.0), {"y": [1.0, 0.4]}, "rk4", v=0.0, dt=0.01, steps=600, outcomes=[*outcomes, "crossing"])
     third = np.pi / 3
@@ -164,6 +151,15 @@ def test_directions_and_what_never_passes() -> None:
         assert float(dataset[f"{name}_crossing"][0]) == pytest.approx(time, abs=1e-8)
         assert np.isnan(dataset[f"{name}_crossing"][1])
     np.testing.assert_allclose(dataset.y_crossing, 1.5 * np.pi, atol=1e-8)
+    # A sampled level that is met exactly at a state: it is passed there, and not again in the next interval.
+    of = [
+        sw.sweeps.Crossing(lambda t, v, y: t + 0.0 * y, 0.5, name="met"),
+        sw.sweeps.Period(lambda t, v, y: t + 0.0 * y, 0.5, name="met"),
+    ]
+    dataset = sw.sweep(Oscillator(1.0), {"y": [1.0, 2.0]}, "rk4", v=0.0, dt=0.25, steps=8, outcomes=of)
+    np.testing.assert_array_equal(dataset.met_crossing, 0.5)
+    np.testing.assert_array_equal(dataset.met_passages, 1)
+    assert np.isnan(dataset.met_period).all()
 
 
 @looped("number, word", [(1, "rising"), (-1, "falling"), (0, "both")])
@@ -174,22 +170,8 @@ def test_directions_are_those_of_events(number: int, word: Any) -> None:
     assert [each.direction for each in crossings + events] == [number] * 4
     assert events[0] == events[1]
     assert repr(crossings[0]) == repr(crossings[1])
-    with pytest.raises(ArgumentError, match=r"direction: there is no 'up'.* Known: rising, falling, both"):
-        sw.sweeps.Crossing("y", direction="up")  # type: ignore[arg-type]
-    with pytest.raises(ArgumentError, match="direction: expected -1 or more, up to 1, got 2"):
-        sw.Event(power, direction=2)
-
-
-def test_a_crossing_at_a_state_counts_once() -> None:
-    """A sampled level that is met exactly at a state: it is passed there, and not again in the next interval."""
-    of = [
-        sw.sweeps.Crossing(lambda t, v, y: t + 0.0 * y, 0.5, name="met"),
-        sw.sweeps.Period(lambda t, v, y: t + 0.0 * y, 0.5, name="met"),
-    ]
-    dataset = sw.sweep(Oscillator(1.0), {"y": [1.0, 2.0]}, "rk4", v=0.0, dt=0.25, steps=8, outcomes=of)
-    np.testing.assert_array_equal(dataset.met_crossing, 0.5)
-    np.testing.assert_array_equal(dataset.met_passages, 1)
-    assert np.isnan(dataset.met_period).all()
+    refused(ArgumentError, r"direction: there is no 'up'.* Known: rising, falling, both", sw.sweeps.Crossing, "y", direction="up")
+    refused(ArgumentError, "direction: expected -1 or more, up to 1, got 2", sw.Event, power, direction=2)
 
 
 @looped("memory", [64 * 2**20, 3000])
@@ -211,8 +193,16 @@ def test_periods(memory: float) -> None:
     assert (abs(wrong - period) > bound).all()
 
 
-def test_a_sweep_of_exponents_stops_between_two_orthonormalisations() -> None:
-    """As at Ctrl-C: of a chunk that would take days, in a thread that no signal reaches."""
+def test_lyapunov_exponents_are_those_of_lyapunov_and_can_be_stopped() -> None:
+    gamma = np.array([0.2, 0.5])
+    dataset = sw.sweep(
+        duffing, {"gamma": gamma}, "rk4", v=0.0, y=1.0, dt=0.05, steps=300, transient=40, outcomes=sw.sweeps.Exponents("all", 5)
+    )
+    truth = sw.lyapunov(duffing(gamma=gamma), "rk4", v=0.0, y=1.0, dt=0.05, steps=300, transient=40, exponents="all", every=5)
+    np.testing.assert_array_equal(dataset.lyapunov, truth.exponents.T)
+    # The sum of both is minus the damping, up to the error of RK4.
+    np.testing.assert_allclose(dataset.lyapunov.sum("exponent"), -0.3, atol=1e-5)
+    # As at Ctrl-C: of a chunk that would take days, in a thread that no signal reaches.
     start, calls = {"v": 0.0, "y": np.ones(1000), "dt": 0.1, "t0": 0.0}, []
 
     def look() -> None:
@@ -222,17 +212,6 @@ def test_a_sweep_of_exponents_stops_between_two_orthonormalisations() -> None:
 
     with pytest.raises(Stopped):
         sw.sweeps.Exponents(every=20).of_start(sw.Pendulum(), "rk4", start, 40, 10**12, look)
-
-
-def test_lyapunov_exponents_are_those_of_lyapunov() -> None:
-    gamma = np.array([0.2, 0.5])
-    dataset = sw.sweep(
-        duffing, {"gamma": gamma}, "rk4", v=0.0, y=1.0, dt=0.05, steps=300, transient=40, outcomes=sw.sweeps.Exponents("all", 5)
-    )
-    truth = sw.lyapunov(duffing(gamma=gamma), "rk4", v=0.0, y=1.0, dt=0.05, steps=300, transient=40, exponents="all", every=5)
-    np.testing.assert_array_equal(dataset.lyapunov, truth.exponents.T)
-    # The sum of both is minus the damping, up to the error of RK4.
-    np.testing.assert_allclose(dataset.lyapunov.sum("exponent"), -0.3, atol=1e-5)
 
 
 @each_type
@@ -249,7 +228,16 @@ def test_histories_are_those_of_integrate(every: int, steps: int, dtype: Any) ->
     np.testing.assert_array_equal(dataset.t, run.t)
 
 
-def test_a_history_beside_reductions_that_see_other_states() -> None:
+def test_functions_of_a_run_and_a_history_beside_reductions() -> None:
+    def seen(run: sw.Run) -> Any:
+        return {"largest": abs(run.y).max(axis=0), "states": ("k", run.y), "number": np.full(run.status.size, len(run.t))}
+
+    dataset, run = whole(outcomes=[seen, lambda run: run.y[-1] > 0], every=50)
+    assert "y" not in dataset
+    np.testing.assert_array_equal(dataset.states, run.y[::50].T)
+    np.testing.assert_array_equal(dataset.largest, abs(run.y[::50]).max(axis=0))
+    assert dataset.number.dtype.kind == "i"
+    np.testing.assert_array_equal(dataset.function, run.y[-1] > 0)
     dataset = sw.sweep(
         Oscillator, {"omega": [1.0, 2.0]}, "rk4", v=0.0, y=1.0, dt=0.1, steps=20, every=6, observe=4,
         outcomes=["history", "extremes", "last"], memory=1500,
@@ -260,19 +248,7 @@ def test_a_history_beside_reductions_that_see_other_states() -> None:
     np.testing.assert_array_equal(dataset.y_last, run.y[-1])
 
 
-def test_functions_of_a_run() -> None:
-    def seen(run: sw.Run) -> Any:
-        return {"largest": abs(run.y).max(axis=0), "states": ("k", run.y), "number": np.full(run.status.size, len(run.t))}
-
-    dataset, run = whole(outcomes=[seen, lambda run: run.y[-1] > 0], every=50)
-    assert "y" not in dataset
-    np.testing.assert_array_equal(dataset.states, run.y[::50].T)
-    np.testing.assert_array_equal(dataset.largest, abs(run.y[::50]).max(axis=0))
-    assert dataset.number.dtype.kind == "i"
-    np.testing.assert_array_equal(dataset.function, run.y[-1] > 0)
-
-
-def test_what_diverges_leaves_the_others_alone() -> None:
+def test_what_diverges_leaves_the_others_alone_and_what_means_nothing_is_told() -> None:
     omega = np.array([1.0, 30.0, 2.0, 40.0])
     arguments: dict[str, Any] = {"v": 0.0, "y": 1.0, "dt": 0.1, "steps": 1000}
     message = r"2 of 4 members diverged, the first of them at omega = 30, at step 369; status and first_bad_step tell"
@@ -280,8 +256,7 @@ def test_what_diverges_leaves_the_others_alone() -> None:
         dataset = sw.sweep(
             Oscillator, {"omega": omega}, "false_euler", outcomes=["last", "extremes", "period"], chunk=3, **arguments
         )
-    assert len(caught) == 1
-    assert caught[0].filename == __file__
+    assert (len(caught), caught[0].filename) == (1, __file__)
     with pytest.warns(sw.DivergenceWarning):
         run = sw.integrate(Oscillator(omega), "false_euler", **arguments)
     np.testing.assert_array_equal(dataset.status, run.status)
@@ -291,9 +266,6 @@ def test_what_diverges_leaves_the_others_alone() -> None:
         np.testing.assert_array_equal(dataset[name][::2], alone[name])
     assert dataset.status.attrs["flag_meanings"].split()[:3] == ["not_computed", "ok", "diverged"]
     assert np.isnan(dataset.y_max[1])
-
-
-def test_finite_numbers_that_mean_nothing_are_told() -> None:
     with pytest.warns(sw.AccuracyWarning, match=r"in 1 chunk, the first beginning at v = 1: "):
         sw.sweep(sw.Pendulum(), {"v": [1.0, 1e18]}, "rk4", y=0.0, dt=0.1, steps=10)
 

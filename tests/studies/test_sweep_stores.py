@@ -1,7 +1,5 @@
 """Sweeps on disk: what is there after a kill, Ctrl-C, or with a torn file; and what is done again, and what is not."""
 
-from __future__ import annotations
-
 import json
 import os
 import re
@@ -15,6 +13,7 @@ import xarray
 from stepwell.errors import ArgumentError
 from stepwell.studies.sweeps import engines, stores
 from support.looped import in_turn
+from support.refusals import refused
 from support.sweeping import chunk_files, small, unlike
 
 KINDS = pytest.mark.parametrize("ending", ["zarr", "nc"])
@@ -157,27 +156,20 @@ def test_a_store_of_another_sweep_is_refused(tmp_path: Path) -> None:
         ({"dt": 0.1}, "given: "),
         ({"outcomes": "extremes"}, "outcomes: "),
         ({"axes": {"gamma": [0.1, 0.2]}, "y": 1.0}, "axes: "),
+        ({"dt": 0.1}, "given: {'dt': "),
         ({"fused": True}, "given: "),
         ({"v": 1.0}, "given: "),
     ):
         with pytest.raises(ArgumentError, match=re.escape("is of another sweep and is not continued (") + f".*{name}"):
             small(**({"outcomes": "last", "steps": 10, "store": path} | wrong))
-
-
-def test_a_store_holds_float32_and_goes_on_with_no_other(tmp_path: Any) -> None:
     store = tmp_path / "sweep.zarr"
     options: dict[str, Any] = {"outcomes": ("last", "extremes", "mean"), "chunk": 9}
     dataset = small(dtype="float32", store=store, **options)
-    assert dataset.y_last.dtype == np.float32
-    assert unlike(dataset.compute(), small(dtype="float32", **options)) == []
+    assert (dataset.y_last.dtype, unlike(dataset.compute(), small(dtype="float32", **options))) == (np.float32, [])
     assert unlike(small(dtype="float32", store=store, **options).compute(), dataset.compute()) == []
-    with pytest.raises(ArgumentError, match="is of another sweep and is not continued"):
-        small(store=store, **options)
-
-
-def test_other_equations_of_the_same_name_are_refused(tmp_path: Path) -> None:
-    """The first steps of two members are compared to the bit."""
-    path, arguments = tmp_path / "a.zarr", {"y": 1.0, "v": 0.0, "dt": 0.1, "steps": 10}
+    refused(ArgumentError, "is of another sweep and is not continued", small, store=store, **options)
+    # The first steps of two members are compared to the bit.
+    path, arguments = tmp_path / "spring.zarr", {"y": 1.0, "v": 0.0, "dt": 0.1, "steps": 10}
 
     def spring(factor: float) -> Any:
         @sw.system
@@ -272,6 +264,5 @@ def test_a_full_disk_leaves_nothing_that_is_none(ending: str, tmp_path: Path, mo
     interrupted(path, 2, monkeypatch)
     with monkeypatch.context() as patch:
         patch.setattr(zarr.Array, "__setitem__", full)
-        with pytest.raises(ArgumentError, match="the chunks that are done are kept: make room and call again"):
-            small(store=path, outcomes="last")
+        refused(ArgumentError, "the chunks that are done are kept: make room and call again", small, store=path, outcomes="last")
     assert unlike(small(outcomes="last"), small(store=path, outcomes="last").load()) == []

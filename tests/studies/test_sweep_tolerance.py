@@ -1,7 +1,5 @@
 """Sweeps with a tolerance: the bits of ``integrate(tolerance=)`` on every engine and in every division, and what is refused."""
 
-from __future__ import annotations
-
 import re
 import warnings
 from concurrent.futures import ThreadPoolExecutor
@@ -16,22 +14,15 @@ from stepwell.errors import ArgumentError
 from stepwell.studies.sweeps import task
 from support.families import family
 from support.looped import looped
+from support.refusals import refused
 from support.sweeping import AXES, Pickling, duffing, ends, power, unlike
 
 METHODS = ("merson", "fehlberg", "fehlberg_5", "dop853", "taylor")
 GAMMA, Y0 = (values for _, values in AXES.values())
 AT = np.linspace(0.0, 6.0, 25)
 OUTCOMES = (
-    "last",
-    "extremes",
-    "mean",
-    "crossing",
-    "period",
-    "evaluations",
-    "history",
-    sw.sweeps.Extremes("energy"),
-    sw.sweeps.Mean(power),
-    ends,
+    *("last", "extremes", "mean", "crossing", "period", "evaluations", "history"),
+    *(sw.sweeps.Extremes("energy"), sw.sweeps.Mean(power), ends),
 )
 
 
@@ -48,13 +39,9 @@ def alike(method: str = "dop853", **options: Any) -> sw.Run:
     return sw.integrate(duffing(delta=0.2, gamma=GAMMA[:, None]), method, **arguments)
 
 
-# ---- the bits of integrate
-
-
 @looped("method", METHODS)
 def test_members_are_those_of_integrate(method: str) -> None:
     dataset, run = adaptive(method=method, outcomes=["last", "history", "evaluations"], chunk=7, memory=20_000.0), alike(method)
-    assert run.paces is not None
     np.testing.assert_array_equal(dataset.y, np.moveaxis(run.y, 0, -1))
     np.testing.assert_array_equal(dataset.v, np.moveaxis(run.v, 0, -1))
     np.testing.assert_array_equal(dataset.y_last, run.y[-1])
@@ -81,7 +68,6 @@ def test_members_are_those_of_integrate(method: str) -> None:
 )
 def test_arguments_are_those_of_integrate(options: dict[str, Any]) -> None:
     dataset, run = adaptive(outcomes=["last", "evaluations"], chunk=10, memory=20_000.0, **options), alike(**options)
-    assert run.paces is not None
     np.testing.assert_array_equal(dataset.y_last, run.y[-1])
     np.testing.assert_array_equal(dataset.evaluations, run.paces.evaluations)
 
@@ -94,14 +80,10 @@ def test_a_tolerance_as_an_axis(method: str) -> None:
         partial(duffing, delta=0.2), axes, method, v=0.0, at=6.0, outcomes=["last", "evaluations"], chunk=4, threads=2
     )
     run = sw.integrate(duffing(delta=0.2), method, v=0.0, y=Y0[:, None], tolerance=relative, at=[6.0])
-    assert run.paces is not None
     np.testing.assert_array_equal(dataset.y_last, run.y[-1])
     np.testing.assert_array_equal(dataset.evaluations, run.paces.evaluations)
     np.testing.assert_array_equal(dataset.tolerance, relative)
     assert "tolerance" not in dataset.attrs
-
-
-# ---- what reductions see
 
 
 def test_reductions_see_the_states_at_the_times() -> None:
@@ -117,7 +99,7 @@ def test_reductions_see_the_states_at_the_times() -> None:
     np.testing.assert_array_equal(dataset.twice, 2.0 * run.y[-1])
 
 
-def test_unequal_times() -> None:
+def test_unequal_times_crossings_and_periods() -> None:
     """The mean of cos over [0, 2π/3]: each interval errs by its length cubed, times the largest |cos|, over 12."""
     at = np.concatenate([np.linspace(0.0, 1.0, 101), np.linspace(1.0, 2.0 * np.pi / 3.0, 301)[1:]])
     dataset = sw.sweep(sw.Oscillator, {"omega": [1.0, 1.0]}, "dop853", v=0.0, y=1.0, tolerance=1e-12, at=at, outcomes="mean")
@@ -128,10 +110,7 @@ def test_unequal_times() -> None:
     # As if all intervals were as long as the first: far outside.
     weights = np.full(at.size, 0.01)
     assert abs((weights * np.cos(at)).sum() / end - np.sin(end) / end) > 100 * bound
-
-
-def test_crossings_and_periods_are_those_of_the_exact_motion() -> None:
-    """By a cubic through both states and their rates: (interval·ω)⁴/384 over the speed; the states err by far less."""
+    # By a cubic through both states and their rates: (interval·ω)⁴/384 over the speed; the states err by far less.
     omega, h = np.array([1.0, 1.3, 1.7]), 0.1
     at = h * np.arange(300)
     dataset = sw.sweep(
@@ -141,9 +120,6 @@ def test_crossings_and_periods_are_those_of_the_exact_motion() -> None:
     assert (abs(dataset.y_crossing.values - 1.5 * np.pi / omega) < bound).all()
     n = dataset.y_passages.values - 1
     assert (abs(dataset.y_period.values - 2 * np.pi / omega) < 2 * bound / n).all()
-
-
-# ---- the same bits everywhere
 
 
 @pytest.fixture(scope="module")
@@ -204,13 +180,9 @@ def test_a_store_goes_on_and_refuses_another_tolerance(whole: Any, ending: str, 
             assert unlike(whole, dataset) == []
             assert (dataset.attrs["tolerance"], dataset.attrs["end"]) == (1e-8, 6.0)
     for other in ({"tolerance": 1e-9}, {"tolerance": (1e-8, 1e-12)}, {"at": AT[1:]}, {"max_steps": 77}):
-        with pytest.raises(ArgumentError, match="store: "):
-            adaptive(store=path, chunk=10, **other)
+        refused(ArgumentError, "store: ", adaptive, store=path, chunk=10, **other)
     with adaptive(store=tmp_path / f"b.{ending}", tolerance=(1e-8, 1e-12)) as dataset:
         assert dataset.attrs["tolerance"] == "(1e-08, 1e-12)"
-
-
-# ---- members that stop
 
 
 @sw.system(order=1)
@@ -227,19 +199,12 @@ def test_what_stops_leaves_the_others_alone(monkeypatch: pytest.MonkeyPatch) -> 
         run = sw.integrate(explosion(rate=rate), "dop853", **arguments)
     message = r"2 of 5 members stopped before t = 3, the first of them at rate = 0.8: (the step that|no step)"
     results = []
+    outcomes = ["last", "history", "extremes", "evaluations"]
     for options, times in (({}, 31), ({"chunk": 2}, 31), ({"chunk": 3}, 4)):
         in_pieces(monkeypatch, times)
         with pytest.warns(sw.ToleranceWarning, match=message) as caught:
-            dataset = sw.sweep(
-                explosion,
-                {"rate": rate},
-                "dop853",
-                outcomes=["last", "history", "extremes", "evaluations"],
-                **arguments,
-                **options,
-            )
-        assert len(caught) == 1
-        assert caught[0].filename == __file__
+            dataset = sw.sweep(explosion, {"rate": rate}, "dop853", outcomes=outcomes, **arguments, **options)
+        assert (len(caught), caught[0].filename) == (1, __file__)
         np.testing.assert_array_equal(dataset.y, run.y.T)
         np.testing.assert_array_equal(dataset.status, run.status)
         np.testing.assert_array_equal(dataset.first_bad_step, run.first_bad_step)
@@ -251,7 +216,7 @@ def test_what_stops_leaves_the_others_alone(monkeypatch: pytest.MonkeyPatch) -> 
     np.testing.assert_allclose(results[0].y_last[[0, 2, 4]], 1.0 / (1.0 - 3.0 * rate[[0, 2, 4]]), rtol=1e-6)
 
 
-def test_a_budget_is_that_of_the_whole_run(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_budget_is_that_of_the_whole_run_and_lost_motion_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     """However many pieces there are."""
     arguments: dict[str, Any] = {"v": 0.0, "y": 1.0, "tolerance": 1e-9, "at": np.linspace(0.0, 40.0, 41), "max_steps": 200}
     omega = np.array([0.5, 1.0, 20.0])
@@ -266,9 +231,6 @@ def test_a_budget_is_that_of_the_whole_run(monkeypatch: pytest.MonkeyPatch) -> N
         np.testing.assert_array_equal(dataset.status, run.status)
         np.testing.assert_array_equal(dataset.y, run.y.T)
     assert run.status[-1] == sw.Status.BUDGET
-
-
-def test_motion_that_is_lost_in_an_absolute_tolerance_is_told() -> None:
     arguments: dict[str, Any] = {"v": 0.0, "tolerance": (1e-9, 1e-3), "at": [1.0]}
     with pytest.warns(sw.ToleranceWarning, match=r"tolerance: for 1 of 2 members the absolute part lets a step err"):
         sw.sweep(sw.Oscillator(), {"y": [1.0, 1e-3]}, "dop853", **arguments)
@@ -277,18 +239,8 @@ def test_motion_that_is_lost_in_an_absolute_tolerance_is_told() -> None:
         sw.sweep(sw.Oscillator(), {"y": [1.0, 2.0]}, "dop853", **arguments)
 
 
-# ---- what is refused
-
-
-GOOD: dict[str, Any] = {
-    "system": sw.Oscillator,
-    "axes": {"omega": [1.0, 2.0]},
-    "method": "dop853",
-    "v": 0.0,
-    "y": 1.0,
-    "tolerance": 1e-9,
-    "at": [1.0, 2.0],
-}
+GOOD: dict[str, Any] = {"system": sw.Oscillator, "axes": {"omega": [1.0, 2.0]}, "method": "dop853", "v": 0.0, "y": 1.0}
+GOOD |= {"tolerance": 1e-9, "at": [1.0, 2.0]}
 REFUSED: dict[str, tuple[dict[str, Any], str]] = {
     "steps": ({"steps": 10}, "steps: works with fixed steps only, and tolerance= or at= was given"),
     "a transient": ({"transient": 0}, "transient: works with fixed steps only"),
@@ -336,22 +288,14 @@ REFUSED: dict[str, tuple[dict[str, Any], str]] = {
 @looped("what", REFUSED)
 def test_what_is_refused(what: str) -> None:
     wrong, message = REFUSED[what]
-    with pytest.raises((sw.StepwellError, TypeError), match=re.escape(message)):
-        sw.sweep(**(GOOD | wrong))
+    refused((sw.StepwellError, TypeError), re.escape(message), sw.sweep, **(GOOD | wrong))
 
 
 def test_lyapunov_exponents_are_those_of_lyapunov() -> None:
     """Each member to its own tolerance."""
     omega, tolerance, at = np.array([1.0, 2.0, 3.0]), np.array([1e-6, 1e-10]), np.linspace(1.0, 12.0, 12)
-    dataset = sw.sweep(
-        sw.Pendulum,
-        {"omega": omega, "tolerance": tolerance},
-        "dop853",
-        v=0.0,
-        y=1.0,
-        at=at,
-        outcomes=sw.sweeps.Exponents("all", transient=4),
-    )
+    axes, outcomes = {"omega": omega, "tolerance": tolerance}, sw.sweeps.Exponents("all", transient=4)
+    dataset = sw.sweep(sw.Pendulum, axes, "dop853", v=0.0, y=1.0, at=at, outcomes=outcomes)
     for i, k in np.ndindex(3, 2):
         truth = sw.lyapunov(
             sw.Pendulum(omega[i]), "dop853", v=0.0, y=1.0, tolerance=tolerance[k], at=at, transient=4, exponents="all"

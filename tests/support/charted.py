@@ -3,6 +3,7 @@
 import csv
 import functools
 import importlib
+import json
 
 import pytest
 import stepwell as sw
@@ -59,3 +60,17 @@ def the_small():
 def read(path):
     with path.open(encoding="utf-8") as file:
         return list(csv.DictReader(file))
+
+
+def files_of(chart, folder):
+    """The rows of its table, and what its JSON has, which is strict."""
+    chart.to_csv(folder / "chart.csv")
+    chart.to_json(folder / "chart.json")
+    return read(folder / "chart.csv"), json.loads((folder / "chart.json").read_text(encoding="utf-8"), parse_constant=pytest.fail)
+
+
+def drawn(chart, folder, **options):
+    """The figure of a chart, whose picture has something in it."""
+    figure = chart.plot(folder / "chart.png", **options)
+    assert (folder / "chart.png").stat().st_size > 10_000
+    return figure

@@ -14,10 +14,24 @@ import importlib
 from typing import Any
 
 import numpy as np
+import pytest
 import stepwell as sw
+from stepwell.model import surfaces
+from stepwell.reference import contact
 from stepwell.reference.rosenbrock import Rosenbrock
+from stepwell.runs.engine import direct
+
+from support.mistakes import mistaken
 
 ROUNDING = 64 * 2.0**-53
+
+
+def set_mistaken(patch: pytest.MonkeyPatch, old: str, new: str) -> None:
+    """The reference has other text in one place."""
+    wrong = mistaken(contact, old, new)
+    for module in (surfaces, direct):
+        patch.setattr(module, "contact", wrong)
+
 
 #: Methods whose velocity is not at the same time as y, and by how much: c/(h·g).
 LAG = {"standard_euler": 0.5, "damped_euler": 0.5} | dict.fromkeys(

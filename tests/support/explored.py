@@ -64,6 +64,12 @@ def page() -> sw.Explorer:
     return sw.explore()
 
 
+@pytest.fixture(scope="module", name="file")
+def the_file(tmp_path_factory: pytest.TempPathFactory) -> str:
+    """The page, as a browser opens it."""
+    return page().save(tmp_path_factory.mktemp("page") / "explorer.html").as_uri()
+
+
 def scene_of(name: str) -> sw.Scene:
     return sliders.rope() if name == "rope" else sw.scenes.scene(name)
 

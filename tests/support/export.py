@@ -1,7 +1,5 @@
 """What tests of export share: sets of steps that go abroad, which every language brings home with the bits of ``integrate``."""
 
-from __future__ import annotations
-
 import re
 import sys
 from collections.abc import Callable, Iterator
@@ -113,8 +111,6 @@ def shown(step: sw.ExportedStep, folder: Path) -> float:
 
 
 # ---- sets of journeys; ``every`` takes every so many-th of each
-
-
 def of_all_methods_and_systems(language: str, every: int = 1) -> list[Journey]:
     """In as few pairs as there are systems: each language has others."""
     wanted = {name for name in SYSTEMS if name != LONGEST or language == "python"}
@@ -374,19 +370,8 @@ def of_bits(language: str, every: int = 1) -> list[Journey]:
     return journeys
 
 
-#: Functions that an export of ``of_bits`` calls.
-ON_BITS = (
-    "choose_bits",
-    "mask_of",
-    "and_bits",
-    "or_bits",
-    "xor_bits",
-    "add_bits",
-    "sub_bits",
-    "shift_up",
-    "shift_down",
-    "turn_sign",
-)
+ON_BITS = tuple(f"{each}_bits" for each in ("choose", "and", "or", "xor", "add", "sub"))
+ON_BITS += ("mask_of", "shift_up", "shift_down", "turn_sign")
 
 
 def net(n: int, **others: Any) -> tuple[sw.Springs, Any]:
@@ -426,26 +411,15 @@ def exponentials(t: Any, v: Any, y: Any) -> Any:
     return -np.exp(y) + np.roll(y, 1)
 
 
-def lying(n: int, restitution: float = 0.3, friction: float | None = 0.2) -> tuple[sw.Springs, Any]:
-    """A net just above a floor that is inclined."""
-    springs, at = net(n, floor=sw.Floor(restitution=restitution, friction=friction, normal=(0.0, 0.6, 0.8), offset=-0.05))
-    return springs, at
-
-
 def with_lanes(language: str = "c", every: int = 1) -> list[Journey]:
     """Nets, ropes, particles, bodies and equations of one's own, by methods of one stage and of several."""
     rng = np.random.default_rng(7)
     (springs, at), (undamped, _) = net(6), net(6, damping=None)
-    contacts, flat = lying(5)
-    (few, near), (fewer, nearer) = net(5), lying(3)
-    rope = sw.Springs(
-        [(i, i + 1) for i in range(39)],
-        rest=0.9,
-        masses=np.linspace(1.0, 2.0, 40),
-        stiffness=90.0,
-        gravity=[0.0, -9.81],
-        fixed=[0],
-    )
+    # Just above a floor that is inclined.
+    floor = sw.Floor(restitution=0.3, friction=0.2, normal=(0.0, 0.6, 0.8), offset=-0.05)
+    (contacts, flat), (few, near), (fewer, nearer) = net(5, floor=floor), net(5), net(3, floor=floor)
+    hung = {"rest": 0.9, "masses": np.linspace(1.0, 2.0, 40), "stiffness": 90.0, "gravity": [0.0, -9.81], "fixed": [0]}
+    rope = sw.Springs([(i, i + 1) for i in range(39)], **hung)
     along = np.stack([np.arange(40.0), np.zeros(40)], axis=1)
     particles, places = sw.Particles(np.ones(30), gravity=9.81, floor=sw.Floor(restitution=0.5)), rng.uniform(0.0, 0.3, (30, 2))
     bodies, apart = sw.NBody(np.ones(12), force="newton", softening=0.1), rng.normal(size=(12, 3))
@@ -519,8 +493,6 @@ def exported(name: str, journeys: list[Journey], language: str, first: int = 0) 
 
 
 # ---- what is changed in what is exported
-
-
 class Reserved(sw.Oscillator):
     """An oscillator whose parameters are called what languages have for something else."""
 

@@ -9,8 +9,6 @@ Every number that goes into a run is made here by operations that round the same
 matrix product, no power, no sine.
 """
 
-from __future__ import annotations
-
 import argparse
 import hashlib
 import itertools
@@ -18,6 +16,7 @@ import json
 import sys
 import warnings
 from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -67,8 +66,6 @@ class Numbers:
 
 
 # ---- what is written down of a run
-
-
 def arrays(run: sw.Run) -> Arrays:
     """Everything that a run computed."""
     computed: Arrays = {name: getattr(run, name) for name in ("t", "v", "y", "first_bad_step", "status", "carry", "work")}
@@ -98,8 +95,6 @@ def made(recorded: Recorded, backend: str = "rust") -> Arrays:
 
 
 # ---- the families
-
-
 #: The methods that take turns; one that is new must not move the others.
 METHODS = (
     *("standard_euler", "damped_euler", "false_euler", "leapfrog", "verlet", "standard_heun", "false_heun", "semi_false_heun"),
@@ -184,6 +179,11 @@ def _control(kind: str, members: int | None) -> sw.EnergyControl | sw.Projection
     }[kind]()
 
 
+def _held(kind: str, n: int, dim: int, force: str, members: int | None) -> tuple[sw.NBody, dict[str, Any]]:
+    system, state = _bodies(n, dim, force, members)
+    return system, state | {"control": _control(kind, members)}
+
+
 def controlled() -> Iterator[Recorded]:
     """Both forms of the control and both projections, with 2 to 35 bodies, all forces; methods and sizes rotate."""
     turns = itertools.product(("limited", "printed", "scaling", "nacozy"), (2, 3, 8, 35), (2, 3), FORCES)
@@ -191,20 +191,12 @@ def controlled() -> Iterator[Recorded]:
         method, members = HELD[i % len(HELD)], BATCHES[i % (5 if n < 35 else 4)]
         record = QUANTITIES if i % 3 == 0 else ()
         name = f"{method}, {n} bodies in {dim}-D, {force}, {kind}, {_called(members)}" + ", recorded" * bool(record)
-
-        def ask(n: int = n, dim: int = dim, force: str = force, members: int | None = members, kind: str = kind) -> Any:
-            system, state = _bodies(n, dim, force, members)
-            return system, state | {"control": _control(kind, members)}
-
+        ask = partial(_held, kind, n, dim, force, members)
         yield _fixed(name, ask, method=method, dt=0.01, steps=12, every=(None, 1, 5)[i % 3], record=record)
+    ask = partial(_held, "relative", 3, 2, "logarithmic", 3)
     for method in ("standard_euler", "rk4"):
         name = f"{method}, 3 bodies in 2-D, logarithmic, relative gain, target of the start, batch of 3"
-
-        def ask_relative() -> Any:
-            system, state = _bodies(3, 2, "logarithmic", 3)
-            return system, state | {"control": _control("relative", 3)}
-
-        yield _fixed(name, ask_relative, method=method, dt=0.01, steps=40, every=8, t0=1.5, start_step=3)
+        yield _fixed(name, ask, method=method, dt=0.01, steps=40, every=8, t0=1.5, start_step=3)
 
 
 def quantities() -> Iterator[Recorded]:
@@ -213,16 +205,12 @@ def quantities() -> Iterator[Recorded]:
     for (i, method), (n, dim) in zip(enumerate(METHODS * 2), itertools.cycle(turns), strict=False):
         members, force = BATCHES[i % 4], FORCES[i % 3]
         name = f"{method}, {n} bodies in {dim}-D, {force}, {_called(members)}, all recorded"
-        ask = lambda n=n, dim=dim, force=force, members=members: _bodies(n, dim, force, members)  # noqa: E731
+        ask = partial(_bodies, n, dim, force, members)
         yield _fixed(name, ask, method=method, dt=0.02, steps=20, every=3, record=QUANTITIES)
-    for i, system in enumerate(
-        ("free", "damped, physical", "sinusoid x", "pendulum", "restricted three bodies", "Arenstorf's moon")
-    ):
-        method = HELD[2 * i]
-        case = Case(method, system, "direct", None)
-        yield _fixed(
-            f"{method}, {system}, energy recorded", lambda case=case: _case(case, 33), steps=20, every=4, record="energy"
-        )
+    others = ("free", "damped, physical", "sinusoid x", "pendulum", "restricted three bodies", "Arenstorf's moon")
+    for i, system in enumerate(others):
+        ask = partial(_case, Case(HELD[2 * i], system, "direct", None), 33)
+        yield _fixed(f"{HELD[2 * i]}, {system}, energy recorded", ask, steps=20, every=4, record="energy")
 
 
 #: Systems for adaptive steps.
@@ -279,37 +267,30 @@ def paced() -> Iterator[Recorded]:
     hard = np.array([0.1, 0.99, 0.5, 0.1, 0.9])[np.arange(40) % 5]
     for method in ABLE:
         options: dict[str, Any] = {"method": method, "at": [1.0, 3.0, 6.0]}
-        yield _fixed(f"{method}, orbits, tolerance, a pair", lambda: orbit(hard), tolerance=(1e-6, 1e-9), dt=0.2, **options)
-        yield _fixed(f"{method}, orbits, tolerance, out of steps", lambda: orbit(hard), tolerance=1e-8, max_steps=70, **options)
-        yield _fixed(
-            f"{method}, orbits, tolerance, energy recorded", lambda: orbit(0.6), tolerance=1e-7, record="energy", **options
-        )
-        fall = {"v": np.zeros((2, 2)), "y": np.array([[-0.5, 0.0], [0.5, 0.0]])}
-        free = sw.NBody([1.0, 1.0], force="newton")
-        yield _fixed(f"{method}, free fall, tolerance", lambda fall=fall, free=free: (free, fall), tolerance=1e-8, **options)
-        still = {"v": np.zeros((2, 2)), "y": np.zeros((2, 2))}
-        yield _fixed(f"{method}, two in one place, tolerance", lambda s=still, free=free: (free, s), tolerance=1e-8, **options)
+        orbits, name = partial(orbit, hard), f"{method}, orbits, tolerance, "
+        yield _fixed(name + "a pair", orbits, tolerance=(1e-6, 1e-9), dt=0.2, **options)
+        yield _fixed(name + "out of steps", orbits, tolerance=1e-8, max_steps=70, **options)
+        yield _fixed(name + "energy recorded", partial(orbit, 0.6), tolerance=1e-7, record="energy", **options)
+        for name, x in (("free fall", [-0.5, 0.5]), ("two in one place", [0.0, 0.0])):
+            pair = sw.NBody([1.0, 1.0], force="newton"), {"v": np.zeros((2, 2)), "y": np.stack([x, [0.0, 0.0]], axis=1)}
+            yield _fixed(f"{method}, {name}, tolerance", lambda pair=pair: pair, tolerance=1e-8, **options)
 
 
 def diverging() -> Iterator[Recorded]:
     """Steps far past every limit, by every method: which member leaves the finite range in which step, and what is left of it."""
     for i, method in enumerate(METHODS):
-        osc = Case(method, "free", "direct", None)
-        yield _fixed(f"{method}, free, dt = 60", lambda c=osc: _case(c, 70), dt=60.0, steps=400, every=100)
+        free = partial(_case, Case(method, "free", "direct", None), 70)
+        yield _fixed(f"{method}, free, dt = 60", free, dt=60.0, steps=400, every=100)
+        spread = sw.Oscillator(np.arange(33) * 0.25 + 0.125), {"method": method, "v": 0.0, "y": 1.0}
         near = {"dt": 1.0, "steps": 3000, "every": (None, 1000, 1)[i % 3], "start_step": 5}
-
-        def spread(method: str = method) -> Any:
-            omega = np.arange(33) * 0.25 + 0.125
-            return sw.Oscillator(omega), {"method": method, "v": 0.0, "y": 1.0}
-
-        yield _fixed(f"{method}, free, past some limits", spread, **near)
+        yield _fixed(f"{method}, free, past some limits", lambda spread=spread: spread, **near)
     others = ("damped", "pendulum", "restricted three bodies", "three bodies", "eight bodies", "chain of nineteen")
     for i, system in enumerate((*others, "linear, two states", "sampled x, sinusoid a", "linear, seventeen states")):
         case = Case(HELD[(3 * i + 1) % len(HELD)], system, "direct", None)
-        yield _fixed(f"{case.method}, {system}, dt = 60", lambda c=case: _case(c, 33), dt=60.0, steps=200, every=50)
+        yield _fixed(f"{case.method}, {system}, dt = 60", partial(_case, case, 33), dt=60.0, steps=200, every=50)
     for form, method in itertools.product(("matrix", "power"), ("false_euler", "verlet", "rk4")):
-        case = Case(method, "free", form, None)
-        yield _fixed(f"{method}, free, {form}, dt = 3", lambda c=case: _case(c, 33), dt=3.0, steps=2000, every=500)
+        free = partial(_case, Case(method, "free", form, None), 33)
+        yield _fixed(f"{method}, free, {form}, dt = 3", free, dt=3.0, steps=2000, every=500)
 
     def meeting(kind: str) -> Any:
         y = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]])[..., np.newaxis] * np.ones(9)
@@ -319,51 +300,40 @@ def diverging() -> Iterator[Recorded]:
 
     for kind, method in itertools.product(("free", "held"), ("false_euler", "rk4")):
         options: dict[str, Any] = {"method": method, "dt": 0.01, "steps": 300, "every": 100, "record": QUANTITIES}
-        yield _fixed(f"{method}, four bodies, two of them in one place, {kind}", lambda kind=kind: meeting(kind), **options)
+        yield _fixed(f"{method}, four bodies, two of them in one place, {kind}", partial(meeting, kind), **options)
 
     def overshooting() -> Any:
         system, state = _bodies(3, 2, "logarithmic", 6)
         return system, state | {"control": sw.EnergyControl(np.array([0.3, 1.0, 10.0, 100.0, 1e4, 1e6]), "printed", target=1.0)}
 
-    yield _fixed(
-        "standard_euler, three bodies, a control that overshoots", overshooting, method="standard_euler", dt=0.05, steps=300
-    )
+    name = "standard_euler, three bodies, a control that overshoots"
+    yield _fixed(name, overshooting, method="standard_euler", dt=0.05, steps=300)
 
 
 def pieces() -> Iterator[Recorded]:
     """Runs in pieces, by ``resume``."""
     systems = ("free", "sinusoid x", "sampled x, sinusoid a", "pendulum", "three bodies", "chain of five", "linear, masses")
+
+    def make(case: Case, backend: str) -> Arrays:
+        system, arguments = _case(case, 35)
+        return _in_pieces(system, arguments | {"every": 4, "backend": backend}, {"t0": 0.3})
+
     for i, method in enumerate(METHODS):
-        system = systems[i % len(systems)]
-        starts = sw.method(method).starts or (None,)
-        for start in starts:
-            case = Case(method, system, "direct", start)
-
-            def make(backend: str, case: Case = case) -> Arrays:
-                system, arguments = _case(case, 35)
-                return _in_pieces(system, arguments | {"every": 4, "backend": backend}, {"t0": 0.3})
-
-            yield Recorded(f"{case}, in pieces", make)
+        for start in sw.method(method).starts or (None,):
+            case = Case(method, systems[i % len(systems)], "direct", start)
+            yield Recorded(f"{case}, in pieces", partial(make, case))
     for method, form in (("verlet", "matrix"), ("rk4", "matrix"), ("merson", "power")):
+        case = Case(method, "sinusoid x", form, None)
+        yield Recorded(f"{method}, sinusoid x, {form}, in pieces", partial(make, case))
 
-        def make_form(backend: str, method: str = method, form: str = form) -> Arrays:
-            system, arguments = _case(Case(method, "sinusoid x", form, None), 35)
-            return _in_pieces(system, arguments | {"every": 4, "backend": backend}, {"t0": 0.3})
+    def make_held(kind: str, method: str, backend: str) -> Arrays:
+        system, state = _bodies(5, 3, "newton", 9)
+        arguments = state | {"method": method, "dt": 0.01, "record": QUANTITIES, "every": 3, "backend": backend}
+        return _in_pieces(system, arguments, {"control": _control(kind, 9)})
 
-        yield Recorded(f"{method}, sinusoid x, {form}, in pieces", make_form)
-    for kind, method in (
-        ("limited", "rk4"),
-        ("printed", "false_euler"),
-        ("scaling", "standard_heun"),
-        ("nacozy", "standard_euler"),
-    ):
-
-        def make_held(backend: str, kind: str = kind, method: str = method) -> Arrays:
-            system, state = _bodies(5, 3, "newton", 9)
-            arguments = state | {"method": method, "dt": 0.01, "record": QUANTITIES, "every": 3, "backend": backend}
-            return _in_pieces(system, arguments, {"control": _control(kind, 9)})
-
-        yield Recorded(f"{method}, 5 bodies, {kind}, in pieces", make_held)
+    methods = {"limited": "rk4", "printed": "false_euler", "scaling": "standard_heun", "nacozy": "standard_euler"}
+    for kind, method in methods.items():
+        yield Recorded(f"{method}, 5 bodies, {kind}, in pieces", partial(make_held, kind, method))
 
     def make_bad(backend: str) -> Arrays:
         omega = np.arange(70) / 14.0 + 0.03125
@@ -389,15 +359,9 @@ def _in_pieces(
 def worlds() -> Iterator[Recorded]:
     """The real-time loop, with states that the user changes between steps."""
     systems = (
-        "free",
-        "damped",
-        "sinusoids x and a, damped",
-        "pendulum",
-        "three bodies in space",
-        "chain of five",
-        "linear, masses",
+        *("free", "damped", "sinusoids x and a, damped", "pendulum", "three bodies in space", "chain of five", "linear, masses"),
+        *("sampled x and a, physical", "eight bodies", "linear, five states, two inputs", "restricted three bodies"),
     )
-    systems += ("sampled x and a, physical", "eight bodies", "linear, five states, two inputs", "restricted three bodies")
     fitting = {(c.method, c.system) for c in cases() if c.form == "direct"}
     for i, method in enumerate(METHODS):
         system = next(s for s in systems[i % len(systems) :] + systems if (method, s) in fitting)
@@ -408,14 +372,13 @@ def worlds() -> Iterator[Recorded]:
     for method, system in itertools.product(("leapfrog", "verlet", "pefrl"), ("free", "three bodies", "chain of nineteen")):
         case = Case(method, system, "direct", None)
         yield Recorded(f"{case}, world of 40", lambda _, case=case: _stepped(case, 40), True)
+
+    def make(kind: str, method: str, _: str) -> Arrays:
+        system, state = _held(kind, 3, 2, "newton", 5)
+        return _walk(sw.World(system, method, **state, dt=0.01))
+
     for kind, method in (("limited", "false_euler"), ("printed", "rk4"), ("scaling", "standard_euler"), ("nacozy", "rk4")):
-
-        def make(_: str, kind: str = kind, method: str = method) -> Arrays:
-            system, state = _bodies(3, 2, "newton", 5)
-            world = sw.World(system, method, **state, dt=0.01, control=_control(kind, 5))
-            return _walk(world)
-
-        yield Recorded(f"{method}, 3 bodies, {kind}, world of 5", make, True)
+        yield Recorded(f"{method}, 3 bodies, {kind}, world of 5", partial(make, kind, method), True)
 
     def lone(_: str) -> Arrays:
         return _walk(sw.World(sw.Oscillator(1.3), "verlet", v=np.full((), 0.1), y=np.ones(()), dt=0.1))
@@ -449,33 +412,20 @@ def large() -> Iterator[Recorded]:
         for dim in (2, 3):
             i = next(turn)
             method, force = methods[i % len(methods)], FORCES[i % 3]
-            ask = lambda n=n, dim=dim, force=force, members=members: _bodies(n, dim, force, members)  # noqa: E731
             record = QUANTITIES if i % 4 == 0 else ()
             name = f"{method}, {n} bodies in {dim}-D, {force}, {_called(members)}, large" + ", recorded" * bool(record)
+            ask = partial(_bodies, n, dim, force, members)
             yield _fixed(name, ask, method=method, dt=0.01, steps=steps, every=2, record=record)
     for method, dim, force in (("leapfrog", 2, "newton"), ("standard_heun", 3, "logarithmic"), ("rk4", 3, "printed")):
-        ask = lambda dim=dim, force=force: _bodies(1100, dim, force, None)  # noqa: E731
+        ask = partial(_bodies, 1100, dim, force, None)
         yield _fixed(f"{method}, 1100 bodies in {dim}-D, {force}, large", ask, method=method, dt=0.01, steps=2)
-    for kind, method, n in (
-        ("limited", "rk4", 64),
-        ("printed", "false_euler", 100),
-        ("scaling", "rk4", 300),
-        ("nacozy", "false_heun", 64),
-    ):
-
-        def controlled(kind: str = kind, n: int = n) -> Any:
-            system, state = _bodies(n, 3, "newton", 2)
-            return system, state | {"control": _control(kind, 2)}
-
-        yield _fixed(
-            f"{method}, {n} bodies in 3-D, {kind}, large", controlled, method=method, dt=0.01, steps=3, every=1, record=QUANTITIES
-        )
-    yield _fixed(
-        "dop853, 64 bodies, tolerance, large", lambda: _bodies(64, 3, "newton", None), method="dop853", tolerance=1e-6, at=[0.2]
-    )
-    yield _fixed(
-        "merson, 100 bodies, tolerance, large", lambda: _bodies(100, 2, "newton", 2), method="merson", tolerance=1e-5, at=[0.1]
-    )
+    held = ("limited", "rk4", 64), ("printed", "false_euler", 100), ("scaling", "rk4", 300), ("nacozy", "false_heun", 64)
+    for kind, method, n in held:
+        name, ask = f"{method}, {n} bodies in 3-D, {kind}, large", partial(_held, kind, n, 3, "newton", 2)
+        yield _fixed(name, ask, method=method, dt=0.01, steps=3, every=1, record=QUANTITIES)
+    for method, n, dim, members, tolerance, at in (("dop853", 64, 3, None, 1e-6, 0.2), ("merson", 100, 2, 2, 1e-5, 0.1)):
+        name, ask = f"{method}, {n} bodies, tolerance, large", partial(_bodies, n, dim, "newton", members)
+        yield _fixed(name, ask, method=method, tolerance=tolerance, at=[at])
 
     for i, (n, members) in enumerate(((30, None), (30, 5), (30, 33), (80, None), (80, 5))):
 
@@ -501,14 +451,12 @@ def large() -> Iterator[Recorded]:
     for i, method in enumerate(METHODS):
         members = (None, 3, 33)[i % 3]
         name = f"{method}, chain of a hundred, {_called(members)}, large"
-        yield _fixed(name, lambda m=members: chain(m), method=method, dt=0.1, steps=20, every=6)
+        yield _fixed(name, partial(chain, members), method=method, dt=0.1, steps=20, every=6)
     for method, form in (("leapfrog", "matrix"), ("rk4", "power"), ("verlet", "matrix")):
-        yield _fixed(
-            f"{method}, chain of a hundred, {form}, large", lambda: chain(None), method=method, dt=0.1, steps=20, form=form
-        )
-    yield _fixed(
-        "fehlberg_5, chain of a hundred, tolerance, large", lambda: chain(3), method="fehlberg_5", tolerance=1e-5, at=[1.0]
-    )
+        name = f"{method}, chain of a hundred, {form}, large"
+        yield _fixed(name, partial(chain, None), method=method, dt=0.1, steps=20, form=form)
+    name = "fehlberg_5, chain of a hundred, tolerance, large"
+    yield _fixed(name, partial(chain, 3), method="fehlberg_5", tolerance=1e-5, at=[1.0])
 
 
 def runs() -> dict[str, Recorded]:

@@ -26,6 +26,8 @@ LIMITS = {
     "merson": 2 * math.sqrt(3),
     "fehlberg": 0.0,
     "fehlberg_5": 0.0,
+    "bs32": math.sqrt(3),
+    "dopri5": 0.9971890086325299,  # where r₁² = 1 − Φ⁶/1800 + Φ⁸/1600 − Φ¹⁰/14400 + Φ¹²/360000 is 1 again, in 80 digits
     "dop853": 5.96035981170278,  # of the polynomial in truths, in 40 digits
     "pefrl": 2.989449545906729,  # where 1 + p = 0, by bisection of the product of nine shears in fractions
 }
@@ -45,6 +47,8 @@ TAYLOR = {
     "merson": (1, 1, 1 / 2, 1 / 6, 1 / 24, 1 / 144),
     "fehlberg": (1, 1, 1 / 2, 1 / 6, 1 / 24, 1 / 104),
     "fehlberg_5": (1, 1, 1 / 2, 1 / 6, 1 / 24, 1 / 120, 1 / 2080),
+    "bs32": (1, 1, 1 / 2, 1 / 6),
+    "dopri5": (1, 1, 1 / 2, 1 / 6, 1 / 24, 1 / 120, 1 / 600),
     "dop853": (*(1 / math.factorial(k) for k in range(9)), *map(float, DOP853_TAIL)),
 }
 

@@ -47,18 +47,9 @@ def ends(run: sw.Run) -> dict[str, Any]:
 
 
 AXES = {"gamma": ("gamma", np.linspace(0.1, 0.6, 9)), "y": ("y0", np.linspace(-1.0, 1.0, 5))}
-#: Every kind of outcome.
 OUTCOMES = (
-    "last",
-    "extremes",
-    "mean",
-    "crossing",
-    "period",
-    "lyapunov",
-    sw.sweeps.Mean("energy"),
-    sw.sweeps.Extremes(power),
-    sw.sweeps.Crossing(("y"), 0.3, "both", name="third"),
-    ends,
+    *("last", "extremes", "mean", "crossing", "period", "lyapunov", sw.sweeps.Mean("energy"), sw.sweeps.Extremes(power)),
+    *(sw.sweeps.Crossing("y", 0.3, "both", name="third"), ends),
 )
 
 

@@ -15,27 +15,15 @@ Points = tuple[np.ndarray, ...]
 #: Enough for a result of 53 bits that lies close to the middle between two numbers, and for sums that cancel.
 PRECISION = 160
 
-TRUE: dict[str, Callable[..., Any]] = {
-    "sin": mp.sin,
-    "cos": mp.cos,
-    "tan": mp.tan,
-    "arcsin": mp.asin,
-    "arccos": mp.acos,
-    "arctan": mp.atan,
-    "arctan2": mp.atan2,
-    "sinh": mp.sinh,
-    "cosh": mp.cosh,
-    "tanh": mp.tanh,
-    "exp": mp.exp,
-    "expm1": mp.expm1,
+SAME = ("sin", "cos", "tan", "sinh", "cosh", "tanh", "exp", "expm1", "log", "log1p", "log10", "power")
+TRUE: dict[str, Callable[..., Any]] = {name: getattr(mp, name) for name in SAME} | {
+    f"arc{name}": getattr(mp, f"a{name}") for name in ("sin", "cos", "tan", "tan2")
+}
+TRUE |= {
     "exp2": lambda x: mp.power(2, x),
-    "log": mp.log,
-    "log1p": mp.log1p,
     "log2": lambda x: mp.log(x, 2),
-    "log10": mp.log10,
     "cbrt": lambda x: mp.sign(x) * mp.cbrt(abs(x)),
     "hypot": lambda x, y: mp.sqrt(x * x + y * y),
-    "power": mp.power,
     "deg2rad": lambda x: x * mp.pi / 180,
     "rad2deg": lambda x: x * 180 / mp.pi,
 }

@@ -63,6 +63,8 @@ CLOSED_FORMS: dict[str, Callable[[float], Matrix]] = {
     "merson": lambda f: _taylor(f, Fraction(1, 144)),
     "fehlberg": lambda f: _taylor(f, Fraction(1, 104)),
     "fehlberg_5": lambda f: _taylor(f, Fraction(1, 120), Fraction(1, 2080)),
+    "bs32": lambda f: np.array([[1 - f**2 / 2, -f + f**3 / 6], [f - f**3 / 6, 1 - f**2 / 2]]),
+    "dopri5": lambda f: _taylor(f, Fraction(1, 120), Fraction(1, 600)),
     "dop853": lambda f: _taylor(f, *(Fraction(1, math.factorial(k)) for k in range(5, 9)), *DOP853_TAIL),
     "pefrl": _pefrl,
 }
@@ -93,6 +95,8 @@ WEIGHTS: dict[str, dict[float, float]] = {
     "merson": {0.0: 1 / 6, 0.5: 2 / 3, 1.0: 1 / 6},
     "fehlberg": {0.0: 25 / 216, 3 / 8: 1408 / 2565, 12 / 13: 2197 / 4104, 1.0: -1 / 5},
     "fehlberg_5": {0.0: 16 / 135, 3 / 8: 6656 / 12825, 12 / 13: 28561 / 56430, 1.0: -9 / 50, 0.5: 2 / 55},
+    "bs32": {0.0: 2 / 9, 0.5: 1 / 3, 0.75: 4 / 9},
+    "dopri5": {0.0: 35 / 384, 0.3: 500 / 1113, 0.8: 125 / 192, 8 / 9: -2187 / 6784, 1.0: 11 / 84},
     "dop853": {
         0.0: 5.42937341165687622380535766363e-2,
         1 / 3: 4.45031289275240888144113950566,

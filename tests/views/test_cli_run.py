@@ -1,8 +1,5 @@
 """``stepwell run``: what it takes, and its verdict in words."""
 
-from __future__ import annotations
-
-import json
 from typing import Any
 
 import numpy as np
@@ -15,15 +12,8 @@ from stepwell.views.cli.verdict import growth_of, tenfold, verdict
 from support import commands
 
 
-def run_command(capsys: Any, *words: str) -> tuple[int, str, str]:
-    return commands.run_command(capsys, "run", *words)
-
-
-def report(capsys: Any, *words: str) -> dict[str, Any]:
-    code, out, err = run_command(capsys, *words, "--json")
-    assert (code, err) == (0, "")
-    printed: dict[str, Any] = json.loads(out)
-    return printed
+def report(capsys: Any, *words: str) -> Any:
+    return commands.listed(capsys, "run", *words)
 
 
 def test_a_tolerance_makes_the_run_of_integrate(capsys: Any) -> None:
@@ -31,22 +21,19 @@ def test_a_tolerance_makes_the_run_of_integrate(capsys: Any) -> None:
     at = np.linspace(0.0, scene.horizon, 101)
     run = sw.integrate(scene.system, "merson", v=scene.v, y=scene.y, tolerance=1e-6, at=at)
     printed = report(capsys, "kepler", "--method", "merson", "--tolerance", "1e-6")
-    assert run.paces is not None
     assert printed["last_y"] == run.y[-1].tolist()
     assert (printed["steps"], printed["rejected_steps"]) == (run.paces.accepted, run.paces.rejected)
     assert printed["function_evaluations"] == run.paces.evaluations
     assert printed["largest_state_error"] == scene.state_error(run).max()
     for option in ("--steps", "--every"):
-        code, _, err = run_command(capsys, "kepler", "--method", "merson", "--tolerance", "1e-6", option, "5")
-        assert code == 2
-        assert err.startswith(f"stepwell: {option}: works with fixed steps only")
+        said = commands.complaint(capsys, "run", "kepler", "--method", "merson", "--tolerance", "1e-6", option, "5")
+        assert said.startswith(f"stepwell: {option}: works with fixed steps only")
 
 
 def test_without_a_method_the_advised_one_is_taken(capsys: Any) -> None:
     scene = sw.scenes.clover()
     printed = report(capsys, "clover")
     best = sw.advise(scene, scene.dt, methods=[printed["method"]], cost="evaluations", budget=1e9).best
-    assert best is not None
     assert (printed["method"], printed["dt"]) == ("leapfrog", best.dt)
     assert printed["largest_state_error"] == pytest.approx(best.error, rel=0.05)
     assert printed["advised"].startswith("the cheapest of leapfrog, ")
@@ -67,32 +54,18 @@ def test_where_no_method_can_be_advised_the_usual_one_runs(capsys: Any, monkeypa
 
     monkeypatch.setattr("stepwell.views.cli.advised.advise", refused)
     printed = report(capsys, "oscillator")
-    assert printed["method"] == "rk4"
-    assert printed["advised"] == "no: scene: its true motion is not known; rk4 is usual"
+    assert (printed["method"], printed["advised"]) == ("rk4", "no: scene: its true motion is not known; rk4 is usual")
     printed = report(capsys, "oscillator", "--tolerance", "1e-4")
     assert printed["advised"] == "no: dop853 is usual with a tolerance; --method NAME takes another"
 
 
-def test_form_and_start_are_those_of_integrate(capsys: Any) -> None:
-    scene = sw.scenes.oscillator()
-    for form in ("matrix", "power"):
-        printed = report(capsys, "oscillator", "--method", "rk4", "--form", form, "--steps", "50")
-        assert printed["last_y"] == scene.run("rk4", steps=50, every=1, form=form).y[-1]
-    printed = report(capsys, "oscillator", "--method", "verlet", "--start", "first_order", "--steps", "50")
-    assert printed["last_y"] == scene.run("verlet", steps=50, start="first_order").y[-1]
-    assert printed["last_y"] != scene.run("verlet", steps=50).y[-1]
-
-
-def test_set_changes_the_scene_and_its_exact_solution(capsys: Any) -> None:
+def test_set_changes_the_scene_the_system_and_the_start(capsys: Any) -> None:
     printed = report(capsys, "oscillator", "--method", "rk4", "--set", "omega=3")
     scene = sw.scenes.oscillator(3.0)
     run = scene.run("rk4", every=1)
     assert printed["last_y"] == run.y[-1]
     assert printed["largest_state_error"] == scene.state_error(run).max()
     assert scene_with("kepler:e=0.5", []).v.tolist() == scene_with("kepler", ["e=0.5"]).v.tolist()
-
-
-def test_set_changes_the_system_and_the_start(capsys: Any) -> None:
     printed = report(capsys, "oscillator", "--method", "rk4", "--set", "damping=0.1", "--set", "y=2", "--steps", "40")
     scene = sw.scenes.oscillator()
     run = sw.integrate(sw.Oscillator(1.0, 0.1), "rk4", v=0.0, y=2.0, dt=scene.dt, steps=40)
@@ -116,12 +89,18 @@ SETTINGS = [
 ]
 
 
-def test_a_wrong_setting_is_one_line(capsys: Any) -> None:
+def test_form_and_start_are_those_of_integrate_and_wrong_settings_are_one_line(capsys: Any) -> None:
     for setting, message in SETTINGS:
-        code, out, err = run_command(capsys, "oscillator", "--method", "rk4", "--set", setting)
-        assert (code, out) == (2, "")
-        assert message in err
-        assert err.count("\n") == 1, setting
+        said = commands.complaint(capsys, "run", "oscillator", "--method", "rk4", "--set", setting)
+        assert message in said
+        assert said.count("\n") == 1, setting
+    scene = sw.scenes.oscillator()
+    for form in ("matrix", "power"):
+        printed = report(capsys, "oscillator", "--method", "rk4", "--form", form, "--steps", "50")
+        assert printed["last_y"] == scene.run("rk4", steps=50, every=1, form=form).y[-1]
+    printed = report(capsys, "oscillator", "--method", "verlet", "--start", "first_order", "--steps", "50")
+    assert printed["last_y"] == scene.run("verlet", steps=50, start="first_order").y[-1]
+    assert printed["last_y"] != scene.run("verlet", steps=50).y[-1]
 
 
 VERDICTS = [
@@ -137,7 +116,7 @@ VERDICTS = [
 @pytest.mark.filterwarnings("ignore")
 def test_the_verdict_is_in_words(capsys: Any) -> None:
     for words, beginning in VERDICTS:
-        code, out, _ = run_command(capsys, *words)
+        code, out, _ = commands.run_command(capsys, "run", *words)
         assert code == 0
         (said,) = [line.partition("verdict")[2].strip() for line in out.splitlines() if line.startswith("verdict")]
         assert said.startswith(beginning), words
@@ -159,15 +138,12 @@ def test_growth_is_against_the_true_motion() -> None:
     assert (tenfold(1.2e20), tenfold(387.0), tenfold(9.9e19)) == ("10²⁰", "a factor of 387", "10²⁰")
 
 
-def test_a_tolerance_that_stops_says_so() -> None:
+def test_a_tolerance_that_stops_says_so_and_many_numbers_do_not_fill_the_screen(capsys: Any) -> None:
     scene = sw.scenes.kepler()
     at = np.linspace(0.0, scene.horizon, 11)
     with pytest.warns(sw.ToleranceWarning):
         run = sw.integrate(scene.system, "merson", v=scene.v, y=scene.y, tolerance=1e-8, at=at, max_steps=30)
     assert "reached the largest number of steps allowed" in verdict(charts.run_picture(scene, run))
-
-
-def test_blocks_of_many_numbers_do_not_fill_the_screen(capsys: Any) -> None:
-    _, out, _ = run_command(capsys, "plummer", "--method", "leapfrog", "--steps", "3")
+    _, out, _ = commands.run_command(capsys, "run", "plummer", "--method", "leapfrog", "--steps", "3")
     assert max(map(len, out.splitlines())) < 120
     assert "last y                64 × 3 numbers; -o FILE writes them" in out

@@ -1,7 +1,5 @@
 """Tables cut no name, number or path, at any width; files and pipes are not wrapped; every table can be written."""
 
-from __future__ import annotations
-
 import csv
 import json
 import re
@@ -10,8 +8,8 @@ from typing import Any
 
 import pytest
 import stepwell as sw
-from stepwell.views import cli
 from stepwell.views.cli.table import UNLIMITED, length, lines_of, width_of_terminal
+from support.commands import complaint, listed, printed
 
 COLUMNS = ("method", "order>", "step>", "what it is", "file")
 PATH = "/a/very/long/path/of/a/file"
@@ -34,22 +32,16 @@ def test_every_word_is_whole_at_every_width() -> None:
         assert max(map(length, lines)) <= max(width, longest + len("semi_false_heun") + 3), width
 
 
-def test_a_wide_table_is_one_line_a_row() -> None:
+def test_wide_and_narrow_tables(monkeypatch: pytest.MonkeyPatch) -> None:
     lines = lines_of("t", COLUMNS, ROWS)
     assert len(lines) == 2 + 2 + len(ROWS)
     starts = {line.index("/a/very") for line in lines if "/a/very" in line}
     assert len(starts) == 1
     assert all(line.index("1.4e-05") + 7 == other.index("%") + 1 for line, other in [lines[-2:]])
-
-
-def test_a_narrow_table_repeats_the_first_column() -> None:
     lines = lines_of("t", COLUMNS, ROWS, width=40)
     assert sum(line.startswith("standard_euler") for line in lines) >= 2
     order = [line.split() for line in lines if line.startswith("method")]
     assert all(head[0] == "method" for head in order)
-
-
-def test_width_is_that_of_the_terminal_or_none(monkeypatch: pytest.MonkeyPatch) -> None:
     assert width_of_terminal() == UNLIMITED  # a pipe, as pytest captures
     monkeypatch.setenv("COLUMNS", "80")
     assert width_of_terminal() == 80
@@ -71,15 +63,13 @@ def test_commands_cut_nothing_at_80_columns_and_a_pipe_is_not_wrapped(capsys: An
     for command, words in TABLES.items():
         for width in (80, 60):
             monkeypatch.setenv("COLUMNS", str(width))
-            assert cli.main(words) == 0
-            out = capsys.readouterr().out
+            out = printed(capsys, *words)
             assert not re.search(r"\w…", out), command
             assert max(map(length, out.splitlines())) <= width, command
         monkeypatch.delenv("COLUMNS")
         if command not in ("methods", "scenes", "criteria", "advise"):
             continue
-        assert cli.main(words) == 0
-        lines = capsys.readouterr().out.splitlines()
+        lines = printed(capsys, *words).splitlines()
         for scene in sw.scenes.scenes() if command == "scenes" else ():
             assert any(line.startswith(scene.name) and line.endswith(scene.description) for line in lines)
         assert command != "methods" or sum(line.startswith("semi_false_heun") for line in lines) == 1
@@ -88,25 +78,23 @@ def test_commands_cut_nothing_at_80_columns_and_a_pipe_is_not_wrapped(capsys: An
 
 def test_lists_are_written(capsys: Any, tmp_path: Path) -> None:
     names = {command: ["standard_euler", "semi_false_heun"] for command in ("methods", "bench")}
-    for command, listed in (names | {"scenes": [s.name for s in sw.scenes.scenes()]}).items():
+    for command, names_of in (names | {"scenes": [s.name for s in sw.scenes.scenes()]}).items():
         texts = {}
         for ending in (".json", ".csv", ".md"):
             path = tmp_path / f"list{ending}"
-            assert cli.main([*TABLES[command], "-o", str(path)]) == 0
-            assert f"written: {path}" in capsys.readouterr().out
+            assert f"written: {path}" in printed(capsys, *TABLES[command], "-o", str(path))
             texts[ending] = path.read_text(encoding="utf-8")
-            assert all(name in texts[ending] for name in listed), (command, ending)
+            assert all(name in texts[ending] for name in names_of), (command, ending)
         rows = json.loads(texts[".json"])
-        assert len(list(csv.DictReader(texts[".csv"].splitlines()))) == len(rows) >= len(listed)
+        assert len(list(csv.DictReader(texts[".csv"].splitlines()))) == len(rows) >= len(names_of)
         assert texts[".md"].startswith("| ")
         assert len({line.replace("\\|", "").count("|") for line in texts[".md"].splitlines()}) == 1
-        assert cli.main([*TABLES[command], "-o", str(tmp_path / "list.xls")]) == 2
-        assert capsys.readouterr().err.count("-o: expected a file ending in .csv, .json or .md") == 1
+        said = complaint(capsys, *TABLES[command], "-o", str(tmp_path / "list.xls"))
+        assert said.count("-o: expected a file ending in .csv, .json or .md") == 1
 
 
-def test_bench_times_the_methods_of_a_scene(capsys: Any) -> None:
-    assert cli.main(["bench", "kepler", "--methods", "RK4,leapfrog,standard_heun", "--members", "16", "--json"]) == 0
-    rows = json.loads(capsys.readouterr().out)
+def test_bench_times_the_methods_of_a_scene_and_says_which_it_cannot(capsys: Any) -> None:
+    rows = listed(capsys, "bench", "kepler", "--methods", "RK4,leapfrog,standard_heun", "--members", "16")
     assert {row["method"] for row in rows} == {"rk4", "leapfrog", "standard_heun"}
     times = [row["ns_per_step"] for row in rows]
     assert times == sorted(times)
@@ -117,10 +105,7 @@ def test_bench_times_the_methods_of_a_scene(capsys: Any) -> None:
         assert row["error"] >= 0.0
         assert row["median_ns_per_step"] >= row["ns_per_step"] > 0.0
         assert row["steps_per_second"] == pytest.approx(1e9 / row["ns_per_step"])
-
-
-def test_bench_says_what_it_cannot_time(capsys: Any) -> None:
-    assert cli.main(["bench", "forced_oscillator", "--methods", "verlet,rk4"]) == 0
-    assert "verlet is refused: verlet needs forces that do not depend on the velocity" in capsys.readouterr().out
-    assert cli.main(["bench", "forced_oscillator", "--methods", "verlet"]) == 2
-    assert capsys.readouterr().err.startswith("stepwell: verlet needs forces")
+    out = printed(capsys, "bench", "forced_oscillator", "--methods", "verlet,rk4")
+    assert "verlet is refused: verlet needs forces that do not depend on the velocity" in out
+    said = complaint(capsys, "bench", "forced_oscillator", "--methods", "verlet")
+    assert said.startswith("stepwell: verlet needs forces")

@@ -1,7 +1,5 @@
 """What a terminal shows beyond a pipe: colours, whole words, one table that fits, the answer first, and how long it takes."""
 
-from __future__ import annotations
-
 import io
 import re
 import sys

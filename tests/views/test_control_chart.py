@@ -1,10 +1,7 @@
 """The chart of energy and state against the gain: its numbers are those of single runs, what diverges is told, and it draws."""
 
-from __future__ import annotations
-
 import dataclasses
 import itertools
-import json
 import math
 import warnings
 from pathlib import Path
@@ -14,9 +11,10 @@ import numpy as np
 import pytest
 import stepwell as sw
 from stepwell.errors import ArgumentError, DTypeError, ShapeError, UnknownNameError
-from stepwell.views import cli
 from stepwell.views.charts import ControlSweep, control_picture
 from support import ROOT, charted
+from support.commands import complaint, listed, printed
+from support.refusals import refused
 
 from benches import control_study
 
@@ -32,9 +30,13 @@ def chart() -> ControlSweep:
     return sw.charts.control(EIGHT, methods, horizon=EIGHT.period, evaluations=800, relative=GAINS)
 
 
-def test_all_methods_ask_for_rates_equally_often(chart: ControlSweep) -> None:
+def test_all_methods_ask_for_rates_equally_often_and_what_cannot_be_controlled_is_told(chart: ControlSweep) -> None:
     assert {(line.method.name, line.steps) for line in chart.lines} == {("standard_euler", 800), ("leapfrog", 800), ("rk4", 200)}
     assert all(line.dt * line.steps == pytest.approx(EIGHT.period, rel=1e-15) for line in chart.lines)
+    assert chart.line("leapfrog", "none").state_error < 0.1
+    assert set(chart.refused) == {("leapfrog", kind) for kind in KINDS[1:]}
+    assert "leapfrog carries v_half in place of v" in chart.refused["leapfrog", "limited"]
+    refused(UnknownNameError, "kind: there is no 'limited'", chart.line, "leapfrog", "limited")
 
 
 def test_numbers_are_those_of_single_runs(chart: ControlSweep) -> None:
@@ -66,14 +68,6 @@ def test_numbers_are_those_of_single_runs(chart: ControlSweep) -> None:
         assert line.first_bad_step[i] == -1
 
 
-def test_what_cannot_be_controlled_is_told(chart: ControlSweep) -> None:
-    assert chart.line("leapfrog", "none").state_error < 0.1
-    assert set(chart.refused) == {("leapfrog", kind) for kind in KINDS[1:]}
-    assert "leapfrog carries v_half in place of v" in chart.refused["leapfrog", "limited"]
-    with pytest.raises(UnknownNameError, match="kind: there is no 'limited'"):
-        chart.line("leapfrog", "limited")
-
-
 def test_projection_is_the_limit_of_a_strong_control_for_euler() -> None:
     """A control of infinite gain scales the velocities onto the energy before the step, a projection after it."""
     scene = sw.scenes.kepler(0.3)
@@ -100,19 +94,14 @@ def test_bodies_of_ones_own() -> None:
 
 
 def test_files_and_pictures(chart: ControlSweep, tmp_path: Path) -> None:
-    chart.to_csv(tmp_path / "c.csv")
-    rows = charted.read(tmp_path / "c.csv")
+    rows, whole = charted.files_of(chart, tmp_path)
     # Two methods with two forms of three gains and three single runs, and one method with a single run.
     assert len(rows) == len(chart.rows()) == 2 * (2 * 3 + 3) + 1
     read = [float(row["state_error"]) for row in rows if (row["method"], row["kind"]) == ("rk4", "limited")]
     assert read == chart.line("rk4", "limited").state_error.tolist()
-    chart.to_json(tmp_path / "c.json")
-    whole = json.loads((tmp_path / "c.json").read_text(encoding="utf-8"))
-    assert len(whole["rows"]) == len(rows)
-    assert len(whole["refused"]) == 4
+    assert (len(whole["rows"]), len(whole["refused"])) == (len(rows), 4)
     assert [row["kind"] for row in whole["summary"]] == [line.kind for line in chart.lines]
-    figure = chart.plot(tmp_path / "c.png")
-    assert (tmp_path / "c.png").stat().st_size > 10_000
+    figure = charted.drawn(chart, tmp_path)
     names = ["largest |E − E₀| / K₀", "error of the last state, relative"]
     assert [axes.get_ylabel() for axes in figure.axes[:2]] == names
     assert [axes.get_title(loc="left") for axes in figure.axes[2:]] == [f"{name}: before and after" for name in names]
@@ -193,21 +182,14 @@ def test_bad_arguments_are_named() -> None:
         (ROD | {"evaluations": "many"}, ArgumentError, "evaluations: expected a whole number"),
         ({"scene": sw.Pendulum3D()}, ArgumentError, "v: expected it beside a Pendulum3D system"),
     ):
-        with pytest.raises(error, match=message):
-            sw.charts.control(**({"scene": EIGHT} | arguments))
+        refused(error, message, sw.charts.control, **({"scene": EIGHT} | arguments))
 
 
-# ---- the study
-
-
-def test_the_report_is_current() -> None:
+def test_the_report_is_current_and_what_it_concludes_is_true() -> None:
     """One table of it, which every change of a method, of a control or of a projection would move."""
     report = (ROOT / "benches" / "CONTROL.md").read_text(encoding="utf-8")
     assert control_study.orders() in report
-
-
-def test_what_the_report_concludes() -> None:
-    """Projection makes RK4 better, and Heun under control is better than Heun projected, by at least so much."""
+    # Projection makes RK4 better, and Heun under control is better than Heun projected, by at least so much.
     options: dict[str, Any] = {"horizon": 21.0 * math.pi, "evaluations": 21_000, "relative": [1.0], "forms": ["limited"]}
     for e, rk4, heun in ((0.0, 1.5, 7.0), (0.3, 1.5, 7.0), (0.6, 3.0, 60.0)):
         chart = sw.charts.control(sw.scenes.kepler(e), ["standard_heun", "rk4"], **options)
@@ -217,9 +199,6 @@ def test_what_the_report_concludes() -> None:
         limited, scaled = (chart.line("standard_heun", kind) for kind in ("limited", "scaling"))
         assert scaled.state_error > heun * limited.state_error
         assert scaled.energy_error < 1e-9 * limited.energy_error
-
-
-def test_false_euler_keeps_what_scaling_breaks() -> None:
     scene = sw.scenes.kepler()
     moments = []
     for control in (None, sw.Projection()):
@@ -229,9 +208,6 @@ def test_false_euler_keeps_what_scaling_breaks() -> None:
     # Kicks go along r and drifts along v, so r × v is kept to rounding, 20 000 times 1e-16 of 0.44.
     assert moments[0] < 1e-11
     assert moments[1] > 1e-3
-
-
-# ---- rods: control of the lengths, or resetting
 
 
 C = (0.05, 0.5, 3.0)
@@ -279,8 +255,7 @@ def test_the_document_s_question_is_answered(cone: ControlSweep) -> None:
         assert controlled.diverged.tolist() == [False, False, True]
         assert reset.length_error < 1e-15
     assert set(cone.refused) == {("pefrl", kind) for kind in ("none", "control", "length")}
-    with pytest.raises(ArgumentError, match=r"evaluations: expected one of \[600, 2400\], got 7"):
-        cone.line("rk4", "control", 7)
+    refused(ArgumentError, r"evaluations: expected one of \[600, 2400\], got 7", cone.line, "rk4", "control", 7)
 
 
 def test_the_answer_is_that_of_most_gains() -> None:
@@ -311,19 +286,14 @@ def test_rods_from_rest_are_measured_against_a_tight_run() -> None:
 
 
 def test_files_and_the_picture_of_rods(cone: ControlSweep, tmp_path: Path) -> None:
-    cone.to_csv(tmp_path / "c.csv")
-    rows = charted.read(tmp_path / "c.csv")
+    rows, whole = charted.files_of(cone, tmp_path)
     # Two methods with two steps: three gains, and two single runs.
     assert len(rows) == 2 * 2 * (3 + 2)
     read = [float(row["length_error"]) for row in rows if (row["method"], row["kind"]) == ("rk4", "control")]
     assert read == [*cone.line("rk4", "control", 600).length_error, *cone.line("rk4", "control", 2400).length_error]
-    cone.to_json(tmp_path / "c.json")
-    whole = json.loads((tmp_path / "c.json").read_text(encoding="utf-8"))
-    assert whole["answer"] == cone.answer
+    assert (whole["answer"], whole["evaluations"]) == (cone.answer, [600, 2400])
     assert whole["better"] == {"false_euler": [True, True], "rk4": [False, False]}
-    assert whole["evaluations"] == [600, 2400]
-    figure = cone.plot(tmp_path / "c.png")
-    assert (tmp_path / "c.png").stat().st_size > 10_000
+    figure = charted.drawn(cone, tmp_path)
     assert cone.answer in " ".join(text.get_text() for text in figure.texts)
     above, below = figure.axes[0], figure.axes[2]
     assert (above.get_ylabel(), below.get_ylabel()) == ("error of the last state, relative", "largest error of a length")
@@ -338,13 +308,10 @@ def test_files_and_the_picture_of_rods(cone: ControlSweep, tmp_path: Path) -> No
 
 def test_the_command_line_makes_the_chart(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     words = ["control", "conical_pendulum", "-o", str(tmp_path), "--methods", "false_euler,rk4", "--gains", "0.1,0.5"]
-    assert cli.main([*words, "--evaluations", "600", "--json"]) == 0
-    report = json.loads(capsys.readouterr().out)
+    report = listed(capsys, *words, "--evaluations", "600")
     assert report["answer"].endswith("control is better for False Euler; resetting is better for Runge-Kutta 4")
     assert all(Path(file).stat().st_size > 100 for file in report["files"])
     assert [row["kind"] for row in report["summary"]] == ["none", "control", "length"] * 2
-    assert cli.main([*words, "--evaluations", "300"]) == 0
-    out = capsys.readouterr().out
-    assert "control is better for False Euler" in out
-    assert cli.main(["control", "conical_pendulum", "--gains", "0.1;2", "-o", str(tmp_path)]) == 2
-    assert "--gains: expected numbers with commas between them" in capsys.readouterr().err
+    assert "control is better for False Euler" in printed(capsys, *words, "--evaluations", "300")
+    said = complaint(capsys, "control", "conical_pendulum", "--gains", "0.1;2", "-o", str(tmp_path))
+    assert "--gains: expected numbers with commas between them" in said

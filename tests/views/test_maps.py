@@ -2,7 +2,6 @@
 
 import dataclasses
 import itertools
-import json
 import math
 import time
 from fractions import Fraction
@@ -14,10 +13,11 @@ from stepwell.analysis.stability import series
 from stepwell.errors import ArgumentError, DTypeError, ShapeError, TooLargeError, UnknownNameError, UnsupportedError
 from stepwell.views.charts.maps import ROUNDING
 from support import families
-from support.charted import read
+from support.charted import files_of
 from support.families import family
 from support.for_each import for_each
 from support.looks import faults
+from support.refusals import refused
 from support.truths import CLOSED_FORMS
 
 METHODS = [method for method in sw.methods() if not method.is_implicit]
@@ -40,9 +40,6 @@ POLYNOMIALS = {
 @pytest.fixture(scope="module")
 def false_euler():
     return sw.charts.stability_map("false_euler", phi=(0, 4), size=(200, 101))
-
-
-# ---- the prediction
 
 
 def test_the_radius_is_that_of_the_stability_polynomial():
@@ -89,13 +86,20 @@ def test_the_grid(false_euler):
     chart = sw.charts.stability_map("rk4", phi=(1, 2), damping=(0.5, 0.7), size=3)
     assert (chart.phi[0], chart.phi[-1], chart.damping[0], chart.damping[-1]) == pytest.approx((4 / 3, 2, 0.5, 0.7))
     assert sw.charts.stability_map("rk4").radius.shape == (512, 512)
+    chart = sw.charts.stability_map("false_euler", phi=(0, 4), damping=None, size=(4, 1))
+    assert (chart.phi.tolist(), chart.stable.tolist()) == ([1, 2, 3, 4], [[True, False, False, False]])
+    assert chart.radius[0, 1] == 1
 
 
-def test_a_map_of_an_implicit_method_is_stable_everywhere():
+def test_maps_of_implicit_methods_and_of_those_that_cannot_do_damping():
     for method in IMPLICIT:
         chart = sw.charts.stability_map(method, size=(40, 9))
         assert chart.stable.all(), method
         assert chart.observe(300).disagreements == 0, method
+    for method in UNDAMPED:
+        with pytest.raises(UnsupportedError, match=r"needs forces that do not depend on the velocity, but Oscillator\(omega=1.0"):
+            sw.charts.stability_map(method)
+        refused(ArgumentError, "plot: expected a map of 2 × 2 points or more", sw.charts.stability_map(method, damping=None).plot)
 
 
 @some_damped
@@ -120,24 +124,9 @@ def test_a_map_takes_less_than_a_second():
     assert min(seconds) < 1.0
 
 
-def test_a_double_eigenvalue_on_the_circle_is_not_stable():
-    chart = sw.charts.stability_map("false_euler", phi=(0, 4), damping=None, size=(4, 1))
-    assert chart.phi.tolist() == [1, 2, 3, 4]
-    assert chart.stable.tolist() == [[True, False, False, False]]
-    assert chart.radius[0, 1] == 1
-
-
-def test_a_method_that_cannot_do_damping_says_so():
-    for method in UNDAMPED:
-        with pytest.raises(UnsupportedError, match=r"needs forces that do not depend on the velocity, but Oscillator\(omega=1.0"):
-            sw.charts.stability_map(method)
-        with pytest.raises(ArgumentError, match="plot: expected a map of 2 × 2 points or more"):
-            sw.charts.stability_map(method, damping=None).plot()
-
-
 def test_what_cannot_be_mapped_is_said(false_euler):
     for arguments, error, message in (
-        ({"method": "rk5"}, UnknownNameError, "did you mean 'rk4'"),
+        ({"method": "rk44"}, UnknownNameError, "did you mean 'rk4'"),
         ({"phi": (2, 1)}, ArgumentError, "phi: expected the lower end first, got 2 and 1"),
         ({"phi": (-1, 1)}, ArgumentError, "phi: expected angles of 0 rad or more, got -1"),
         ({"phi": 4}, ShapeError, "phi: expected two numbers"),
@@ -148,13 +137,8 @@ def test_what_cannot_be_mapped_is_said(false_euler):
         ({"size": 2.5}, DTypeError, "size: expected a whole number"),
         ({"size": 10**7}, TooLargeError, "ask for fewer points"),
     ):
-        with pytest.raises(error, match=message):
-            sw.charts.stability_map(**({"method": "rk4"} | arguments))
-    with pytest.raises(ArgumentError, match="steps: expected 1 or more, got 0"):
-        false_euler.observe(0)
-
-
-# ---- the observation
+        refused(error, message, sw.charts.stability_map, **({"method": "rk4"} | arguments))
+    refused(ArgumentError, "steps: expected 1 or more, got 0", false_euler.observe, 0)
 
 
 def agree(observation, undecided):
@@ -167,10 +151,8 @@ def agree(observation, undecided):
 
 @some_damped
 def test_every_point_does_what_its_eigenvalues_say(method):
-    """Oscillators by the thousand for 2000 steps, in a band of half a percent, in which few points of the map are.
-
-    And a prediction of steps that are a fiftieth shorter than those that are made is found out.
-    """
+    """Oscillators by the thousand for 2000 steps, in a band of half a percent, in which few points of the map are."""
+    # And a prediction of steps that are a fiftieth shorter than those that are made is found out.
     chart = sw.charts.stability_map(method, size=(400, 256) if families.LONG else (100, 64))
     observation = chart.observe(2000)
     agree(observation, 0.02)
@@ -186,10 +168,11 @@ def test_every_undamped_point_does_what_its_eigenvalues_say(method):
     observation = chart.observe(1000)
     # Where growth begins with a power of Φ, r₁² = 1 + c·Φᵏ, it is seen by its area from 3δ on. Small steps are near to a rotation
     # by Φ, so the norm of P − z₁I is 2Φ, κ = 3 and δ = 2ρ·9, and not a tenth larger up to Φ = 0.05: Fehlberg's c are 5/936
-    # and 17/9360, which is 0.7 % of the map. A real eigenvalue leaves the circle with a slope of 2 or more (False Heun: 3).
+    # and 17/9360, which is 0.7 % of the map. That of Verner's of order 7 is 7.5e-7 at Φ⁸, so that it begins at 0.2, where the
+    # norm is not a tenth larger either. A real eigenvalue leaves the circle with a slope of 2 or more (False Heun: 3).
     begins = [(k, float(c)) for k, c in series(method).radius_terms(1) if c > 0]
     least = [(1.1 * 3 * 2 * ROUNDING * 9 / c) ** (1 / k) for k, c in begins]
-    assert max(least, default=0.0) < 0.05
+    assert max(least, default=0.0) < (0.25 if method.name == "vern7" else 0.05)
     agree(observation, (sum(least) + observation.band / 2) / chart.phi[-1])
     below = np.count_nonzero(chart.phi < method.limit * (1 - 1e-12))
     assert observation.bounded[0, :below].all()
@@ -197,13 +180,20 @@ def test_every_undamped_point_does_what_its_eigenvalues_say(method):
     assert not method.limit or not chart.stable[0, below + 1]
 
 
-def test_a_wrong_prediction_is_counted(false_euler):
+def test_a_wrong_prediction_is_counted_and_a_slow_growth_is_seen_by_the_area(false_euler):
     wrong = false_euler.stable.copy()
     wrong[:, :10] = False  # stable, but said to grow; with a radius that says so too
     radius = np.where(wrong == false_euler.stable, false_euler.radius, 2.0)
     observed = dataclasses.replace(false_euler, stable=wrong, radius=radius).observe(1000)
     assert observed.disagreements == 10 * 101
     assert "1010 disagreements" in repr(observed)
+    # Fehlberg's fifth-order result at Φ = 0.1: r₁² = 1 + 1.8e-9, a growth of a millionth in 1000 steps. Reversed, it damps.
+    chart = sw.charts.stability_map("fehlberg_5", phi=(0.1, 1), damping=None, size=(900, 1))
+    observed = chart.observe(1000)
+    assert not observed.bounded.any()
+    assert observed.decided.all()
+    wrong = dataclasses.replace(chart, stable=~chart.stable)
+    assert wrong.observe(1000).disagreements == 900
 
 
 def test_threshold_and_band_are_as_derived(false_euler):
@@ -254,16 +244,6 @@ def test_the_area_of_a_pair_changes_as_its_determinant_says():
         assert abs(off) <= allowed, (method, each)
 
 
-def test_a_growth_too_slow_for_the_threshold_is_seen_by_the_area():
-    """Fehlberg's fifth-order result at Φ = 0.1: r₁² = 1 + 1.8e-9, a growth of a millionth in 1000 steps. Reversed, it damps."""
-    chart = sw.charts.stability_map("fehlberg_5", phi=(0.1, 1), damping=None, size=(900, 1))
-    observed = chart.observe(1000)
-    assert not observed.bounded.any()
-    assert observed.decided.all()
-    wrong = dataclasses.replace(chart, stable=~chart.stable)
-    assert wrong.observe(1000).disagreements == 900
-
-
 def test_near_a_double_eigenvalue_the_transient_is_linear_and_stays_below_the_threshold():
     """At Φ = 2 − δ False Euler's states turn with a radius of about 1/√δ: large, bounded, and not to be called growing."""
     chart = sw.charts.stability_map("false_euler", phi=(1.999_999, 2.000_001), damping=None, size=(1000, 1))
@@ -274,18 +254,12 @@ def test_near_a_double_eigenvalue_the_transient_is_linear_and_stays_below_the_th
     assert 1000 < np.abs(run.y).max() < observed.threshold
 
 
-# ---- files and the picture
-
-
 def test_the_files_hold_the_map(false_euler, tmp_path):
-    false_euler.to_csv(tmp_path / "map.csv")
-    rows = read(tmp_path / "map.csv")
+    rows, whole = files_of(false_euler, tmp_path)
     assert [float(row["radius"]) for row in rows] == false_euler.radius.ravel().tolist()
     assert [row["stable"] == "True" for row in rows] == false_euler.stable.ravel().tolist()
     assert [float(row["phi"]) for row in rows] == false_euler.phi.tolist() * 101
     assert [float(row["damping"]) for row in rows] == np.repeat(false_euler.damping, 200).tolist()
-    false_euler.to_json(tmp_path / "map.json")
-    whole = json.loads((tmp_path / "map.json").read_text(encoding="utf-8"))
     assert whole["phi"] == {"first": 0.02, "last": 4.0, "points": 200}
     assert (whole["method"], whole["damping"]["points"], whole["summary"]) == ("false_euler", 101, false_euler.summary())
     assert [row["damping"] for row in whole["summary"]] == [0.0, 0.5, 1.0, 1.5, 2.0]
@@ -311,14 +285,11 @@ def test_the_picture_has_lines_numbers_and_hatching(method, tmp_path):
     assert faults(figure) == []
 
 
-def test_the_thick_line_of_false_euler_is_at_its_limit(false_euler):
+def test_lines_of_maps_are_at_the_limits_and_may_be_missing(false_euler, tmp_path):
     thick = next(c for c in false_euler.plot().axes[0].collections if max(np.atleast_1d(c.get_linewidth())) > 2)
     for path in thick.get_paths():
         phi, damping = path.vertices.T
         assert phi == pytest.approx(2 * (np.sqrt(1 + damping**2) - damping), abs=0.02)
-
-
-def test_a_map_that_is_all_stable_or_all_growing_can_be_drawn(tmp_path):
     stable = sw.charts.stability_map("rk4", phi=(0.1, 0.2), damping=(0.5, 0.6), size=8)
     growing = sw.charts.stability_map("standard_euler", phi=(3, 4), damping=(0, 0.1), size=8)
     assert (stable.stable.all(), growing.stable.any()) == (True, False)
@@ -326,5 +297,4 @@ def test_a_map_that_is_all_stable_or_all_growing_can_be_drawn(tmp_path):
         chart.plot(tmp_path / f"{i}.png")
     assert growing.summary()[0]["stable_up_to"] == 0
     assert stable.summary()[0]["stable_up_to"] == pytest.approx(0.2)
-    with pytest.raises(ArgumentError, match="expected an ending of a picture"):
-        stable.plot(tmp_path / "map.docx")
+    refused(ArgumentError, "expected an ending of a picture", stable.plot, tmp_path / "map.docx")

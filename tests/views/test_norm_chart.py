@@ -1,8 +1,5 @@
 """The chart of a quaternion's norm under control: its numbers against closed forms, its files, its picture, what is refused."""
 
-from __future__ import annotations
-
-import json
 import math
 from pathlib import Path
 
@@ -11,8 +8,9 @@ import pytest
 import stepwell as sw
 from stepwell.errors import ArgumentError, UnsupportedError
 from stepwell.views.charts import norm
-from support.charted import read
+from support.charted import drawn, files_of
 from support.for_each import for_each
+from support.refusals import refused
 
 GAINS = (0.05, 0.3, 0.9)
 
@@ -27,7 +25,7 @@ def test_standard_euler_by_its_formulas(phi: float) -> None:
     np.testing.assert_allclose(line.norm_error, (1 - math.sqrt(1 - phi**2)) / np.array(GAINS), rtol=0, atol=1e-13)
 
 
-def test_the_others_by_their_first_orders() -> None:
+def test_the_others_by_their_first_orders_and_gains_that_are_too_large() -> None:
     """Heun +Φ²/6 with either, and a norm of −Φ²/(2(1 − hk)); RK4 −Φ⁴/120 where it is reset."""
     phi = 0.02
     chart = norm(["standard_heun", "rk4"], phi=phi, gains=(0.1, 0.5))
@@ -37,10 +35,7 @@ def test_the_others_by_their_first_orders() -> None:
     np.testing.assert_allclose(heun.norm_error, [-(phi**2) / 1.8, -(phi**2)], rtol=10 * phi**2)
     assert rk4.angle_error_reset == pytest.approx(-(phi**4) / 120, rel=phi**2)
     assert heun.growth == pytest.approx(phi**4 / 4, rel=1e-6)
-
-
-def test_a_gain_that_is_too_large_is_none() -> None:
-    """The limit of Standard Euler at Φ = 0.1 is 1 + Φ⁴/4."""
+    # The limit of Standard Euler at Φ = 0.1 is 1 + Φ⁴/4.
     line = norm(["standard_euler"], gains=(0.5, 0.98, 1.02, 1.3)).lines[0]
     assert np.isfinite(line.norm_error).tolist() == [True, True, False, False]
     assert line.largest_gain == 0.98
@@ -54,17 +49,12 @@ def test_files_and_picture(tmp_path: Path) -> None:
     shares: list[float] = []
     chart = norm(gains=np.geomspace(0.02, 0.9, 9), progress=shares.append)
     assert shares[-1] == 1.0
-    chart.to_csv(tmp_path / "n.csv")
-    rows = read(tmp_path / "n.csv")
+    rows, written = files_of(chart, tmp_path)
     assert len(rows) == len(chart.rows()) == 27
     assert [float(row["angle_error"]) for row in rows if row["method"] == "rk4"] == chart.lines[2].angle_error.tolist()
-    chart.to_json(tmp_path / "n.json")
-    written = json.loads((tmp_path / "n.json").read_text(encoding="utf-8"))
     assert written["summary"] == chart.summary()
     assert [row["method"] for row in written["summary"]] == ["standard_euler", "standard_heun", "rk4"]
-    figure = chart.plot(tmp_path / "n.png")
-    assert (tmp_path / "n.png").stat().st_size > 10_000
-    left, right = figure.axes
+    left, right = drawn(chart, tmp_path).axes
     assert [axes.get_xlabel() for axes in (left, right)] == ["gain h·k, without a unit"] * 2
     named = [text.get_text() for text in left.texts]
     assert any(text.startswith("Standard Euler (reset: −0.33 %)") for text in named)
@@ -74,12 +64,8 @@ def test_files_and_picture(tmp_path: Path) -> None:
 
 
 def test_what_cannot_be_is_refused() -> None:
-    with pytest.raises(UnsupportedError, match="second-order"):
-        norm(["verlet"])
-    with pytest.raises(ArgumentError, match=r"phi: expected an angle above 0 and below 1 rad, got 1\.5"):
-        norm(phi=1.5)
-    with pytest.raises(ArgumentError, match="gains"):
-        norm(gains=[])
-    with pytest.raises(ArgumentError, match="gains"):
-        norm(gains=[-0.1])
+    refused(UnsupportedError, "second-order", norm, ["verlet"])
+    refused(ArgumentError, r"phi: expected an angle above 0 and below 1 rad, got 1\.5", norm, phi=1.5)
+    refused(ArgumentError, "gains", norm, gains=[])
+    refused(ArgumentError, "gains", norm, gains=[-0.1])
     assert sw.charts.norm is norm

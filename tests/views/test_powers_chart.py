@@ -1,8 +1,5 @@
 """The chart of powers against steps: errors in exact arithmetic, times, and what is refused."""
 
-from __future__ import annotations
-
-import json
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -13,8 +10,9 @@ import stepwell as sw
 from stepwell.errors import ArgumentError, ShapeError, UnsupportedError
 from stepwell.views.charts import powers
 from stepwell.views.charts.powers import FORMS
-from support.charted import read
+from support.charted import drawn, files_of
 from support.for_each import for_each
+from support.refusals import refused
 from support.truths import CLOSED_FORMS
 
 
@@ -72,26 +70,19 @@ def test_a_power_costs_little_and_errs_like_steps() -> None:
 
 def test_files_and_picture(tmp_path: Path) -> None:
     chart = powers("rk4", system=sw.Chain(3), y=[1.0, 0.0, 0.0], steps=[1, 100, 1000])
-    chart.to_csv(tmp_path / "p.csv")
-    rows = read(tmp_path / "p.csv")
+    rows, written = files_of(chart, tmp_path)
     assert [float(row["error"]) for row in rows if row["form"] == "power"] == chart.errors["power"].tolist()
     assert len(rows) == len(chart.rows()) == 9
-    chart.to_json(tmp_path / "p.json")
-    assert json.loads((tmp_path / "p.json").read_text(encoding="utf-8"))["summary"] == chart.summary()
-    figure = chart.plot(tmp_path / "p.png")
-    assert (tmp_path / "p.png").stat().st_size > 10_000
+    assert written["summary"] == chart.summary()
+    figure = drawn(chart, tmp_path)
     assert [axes.get_xlabel() for axes in figure.axes] == ["steps n", "steps n"]
     assert len(figure.axes[0].lines) == len(FORMS)
 
 
 def test_what_has_no_powers_is_refused() -> None:
-    with pytest.raises(UnsupportedError, match="only linear systems have powers"):
-        powers(system=sw.NBody())
-    with pytest.raises(ShapeError, match="one member"):
-        powers(system=sw.Oscillator([1.0, 2.0]))
-    with pytest.raises(ArgumentError, match="steps"):
-        powers(steps=[])
-    with pytest.raises(ArgumentError, match="dt"):
-        powers(dt=0.0)
+    refused(UnsupportedError, "only linear systems have powers", powers, system=sw.NBody())
+    refused(ShapeError, "one member", powers, system=sw.Oscillator([1.0, 2.0]))
+    refused(ArgumentError, "steps", powers, steps=[])
+    refused(ArgumentError, "dt", powers, dt=0.0)
     with pytest.raises(UnsupportedError):
         powers("verlet", system=sw.Oscillator(1.0, 0.1))

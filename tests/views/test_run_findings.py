@@ -1,7 +1,5 @@
 """Titles of the pictures of runs say what came out, by numbers that are known; controlled runs are shown beside free ones."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 from typing import Any
@@ -11,13 +9,19 @@ import pytest
 import stepwell as sw
 from stepwell.views.charts.runs import RunPicture, own_picture, run_picture
 from stepwell.views.charts.runs_finding import finding, percent, tenfold
-from support.pictured import picture_of
+from support.pictured import looked_at, picture_of
 
 START: dict[str, Any] = {"v": 0.0, "y": 1.0, "every": 1}
 
 
-def of(scene: sw.Scene, method: str, dt: float | None = None, **options: Any) -> RunPicture:
-    return run_picture(scene, scene.run(method, dt, **({"every": 1} | options)))
+@sw.system
+def free(t: Any, v: Any, y: Any, *, damping: Any = 0.0) -> Any:
+    return -y - damping * v
+
+
+@free.invariant
+def energy(v: Any, y: Any) -> Any:
+    return 0.5 * (v * v + y * y)
 
 
 def headline(picture: RunPicture) -> str:
@@ -25,33 +29,14 @@ def headline(picture: RunPicture) -> str:
     return next(text.get_text() for text in title if text.get_weight() == "bold")
 
 
-def test_a_growing_oscillation_says_by_how_much() -> None:
+def test_a_growing_or_a_wrong_motion_says_so() -> None:
     """Standard Euler multiplies the amplitude by √(1 + Φ²) a step: by 10^8.05 in 430 steps of Φ = 0.3."""
     assert 430 * 0.5 * math.log10(1.09) == pytest.approx(8.05, abs=0.01)
-    picture = of(sw.scenes.oscillator(), "standard_euler", 0.3, steps=430)
+    picture = looked_at(sw.scenes.oscillator(), "standard_euler", 0.3, steps=430)
     assert finding(picture) == "grows to 10⁸ times the exact motion"
     assert headline(picture) == "Undamped oscillator by Standard Euler: grows to 10⁸ times the exact motion"
-
-
-def test_an_accurate_run_says_how_many_digits() -> None:
-    """Runge-Kutta 4 errs by Φ⁵/120·√(1 + (Φ/1.2)²)… a step: in 100 steps of 0.1 by 8.3e-6, in ten of 0.7 by 1.4e-2.
-
-    That is |R(iΦ)ⁿ − e^(inΦ)|, computed here by R = 1 + z + z²/2 + z³/6 + z⁴/24; v and y take turns to have nearly all of it.
-    """
-    for dt, steps, words in ((0.1, 100, "the exact motion to 5 digits"), (0.7, 10, "up to {} from the exact motion")):
-        z = 1j * dt
-        r = 1 + z + z**2 / 2 + z**3 / 6 + z**4 / 24
-        error = max(abs(r**n - np.exp(n * z)) for n in range(steps + 1))
-        picture = of(sw.scenes.oscillator(), "rk4", dt, steps=steps)
-        assert picture.state_error is not None
-        assert 0.6 * error < picture.state_error.max() <= 1.01 * error
-        assert finding(picture) == words.format(percent(picture.state_error.max()))
-
-
-def test_a_wrong_motion_says_so() -> None:
-    """False Euler's phase error at Φ = 1.9 is Ψ/Φ − 1 = 0.32 a step: after five steps it is opposite, and as large as itself."""
-    picture = of(sw.scenes.oscillator(), "false_euler", 1.9, steps=30)
-    assert picture.state_error is not None
+    # False Euler's phase error at Φ = 1.9 is Ψ/Φ − 1 = 0.32 a step: after five steps it is opposite, and as large as itself.
+    picture = looked_at(sw.scenes.oscillator(), "false_euler", 1.9, steps=30)
     assert 1.5 < picture.state_error.max() < 10.0
     assert finding(picture) == f"not the exact motion, the error reaches {picture.state_error.max():.2g}"
     thrown = picture_of("gone")
@@ -59,17 +44,25 @@ def test_a_wrong_motion_says_so() -> None:
     assert finding(thrown).endswith(" times the exact motion")
 
 
+def test_an_accurate_run_says_how_many_digits() -> None:
+    """Runge-Kutta 4 errs by Φ⁵/120·√(1 + (Φ/1.2)²)… a step: in 100 steps of 0.1 by 8.3e-6, in ten of 0.7 by 1.4e-2."""
+    # That is |R(iΦ)ⁿ − e^(inΦ)|, computed here by R = 1 + z + z²/2 + z³/6 + z⁴/24; v and y take turns to have nearly all of it.
+    for dt, steps, words in ((0.1, 100, "the exact motion to 5 digits"), (0.7, 10, "up to {} from the exact motion")):
+        z = 1j * dt
+        r = 1 + z + z**2 / 2 + z**3 / 6 + z**4 / 24
+        error = max(abs(r**n - np.exp(n * z)) for n in range(steps + 1))
+        picture = looked_at(sw.scenes.oscillator(), "rk4", dt, steps=steps)
+        assert 0.6 * error < picture.state_error.max() <= 1.01 * error
+        assert finding(picture) == words.format(percent(picture.state_error.max()))
+
+
 def test_without_an_exact_solution_the_energy_is_told() -> None:
     """Leapfrog keeps ½v² + ½(1 − Φ²/4)y²: from y = 1 at rest the energy falls by Φ²/4 of itself at y = 0."""
     for dt, words in ((0.2, "energy changes by up to 1 %"), (0.04, "energy kept to 3 digits")):
         picture = own_picture(sw.integrate(sw.Oscillator(), "leapfrog", dt=dt, steps=round(200 / dt), **START))
-        assert picture.energy_error is not None
         assert picture.energy_error.max() == pytest.approx(dt**2 / 4, rel=0.01)
         assert finding(picture) == words
     assert headline(picture) == f"Oscillator by Leapfrog: {words}"
-
-
-def test_an_energy_that_is_lost_is_told_by_its_size() -> None:
     run = sw.integrate(sw.Pendulum(), "standard_euler", dt=0.1, steps=200, v=0.0, y=1.0, every=1)
     worst = run.energy[np.argmax(abs(run.energy - run.energy[0]))]
     assert worst > 2.0 * run.energy[0]
@@ -95,14 +88,6 @@ def test_an_energy_that_forces_change_is_no_error() -> None:
 
 
 def test_a_zero_damping_or_an_energy_of_ones_own_is_kept() -> None:
-    @sw.system
-    def free(t: Any, v: Any, y: Any, *, damping: Any = 0.0) -> Any:
-        return -y - damping * v
-
-    @free.invariant
-    def energy(v: Any, y: Any) -> Any:
-        return 0.5 * (v * v + y * y)
-
     for system in (sw.Oscillator(damping=0.0), free):
         picture = own_picture(sw.integrate(system, "rk4", dt=0.1, steps=100, **START))
         assert picture.energy_error is not None
@@ -110,29 +95,22 @@ def test_a_zero_damping_or_an_energy_of_ones_own_is_kept() -> None:
     assert picture.title == "free by Runge-Kutta 4"
 
 
-def test_an_aircraft_that_settled_says_where() -> None:
+def test_a_run_says_where_it_settled_or_when_it_broke_off() -> None:
     """The steady turn of a commanded roll of 30°: 27.17730° and 6.66655°."""
     run = sw.integrate(sw.Aircraft(roll=30.0), "false_euler", v=0.0, y=0.0, dt=0.1, steps=600, every=1)
     assert finding(own_picture(run)) == "settles at 27.2° roll and 6.7° pitch"
     moving = own_picture(sw.integrate(sw.Aircraft(roll=30.0), "false_euler", v=0.0, y=0.0, dt=0.1, steps=20, every=1))
     assert finding(moving).startswith("roll from 0° to ")
-
-
-def test_a_run_that_broke_off_says_when() -> None:
     picture = picture_of("crash")
     assert finding(picture) == f"diverges at step {int(picture.run.first_bad_step)}"
     scene, at = sw.scenes.kepler(), np.linspace(0.0, 10.0, 50)
     with pytest.warns(sw.ToleranceWarning):
         run = sw.integrate(scene.system, "merson", v=scene.v, y=scene.y, tolerance=1e-9, at=at, max_steps=20)
-    assert run.paces is not None
     picture = run_picture(scene, run)
     assert finding(picture) == f"stops at t = {float(run.paces.t):.4g}"
     words = " ".join(text.get_text() for text in picture.plot().texts)
     assert "Stopped at t = " in words
     assert f"{int(run.paces.accepted)} adaptive steps" in words
-
-
-# ---- where nothing is known
 
 
 @sw.system(order=1)
@@ -177,9 +155,6 @@ def test_a_motion_of_which_no_error_is_known_shows_its_phase_plane() -> None:
     assert "Its energy and its exact solution are not known, so neither are errors." in words
 
 
-# ---- with and without control
-
-
 def controlled(steps: int = 4000, **options: Any) -> sw.Run:
     scene = sw.scenes.energy_control()
     arguments: dict[str, Any] = {"v": scene.v, "y": scene.y, "dt": scene.dt, "steps": steps, "every": 4}
@@ -196,25 +171,16 @@ def test_before_is_the_same_run_without_its_control(both: RunPicture) -> None:
     with pytest.warns(sw.AccuracyWarning):
         free = controlled()
     before = both.before
-    assert before is not None
     for name in ("t", "v", "y", "energy"):
         assert np.array_equal(getattr(before.run, name), getattr(free, name)), name
     assert not np.array_equal(before.run.y, both.run.y)
     assert before.run.system.keeper is None
     assert before.before is None  # nothing is before it
-
-
-def test_before_goes_on_where_the_run_did() -> None:
-    """A run that began at another time and step number: without control it has the same times."""
+    # A run that began at another time and step number: without control it has the same times.
     run = controlled(steps=100, control=sw.EnergyControl(0.3), t0=2.0, start_step=50)
     before = own_picture(run).before
-    assert before is not None
     assert np.array_equal(before.run.t, run.t)
     assert np.array_equal(before.run.y[0], run.y[0])
-
-
-def test_control_is_told_by_what_it_changed(both: RunPicture) -> None:
-    assert both.before is not None
     assert both.energy_error is not None
     assert both.before.energy_error is not None
     factor = np.median(both.before.energy_error) / np.median(both.energy_error)
@@ -225,9 +191,8 @@ def test_control_is_told_by_what_it_changed(both: RunPicture) -> None:
 def test_the_error_of_the_state_is_told_with_that_of_the_energy() -> None:
     """A correct energy alone does not make a motion correct, so it is not told alone."""
     scene = sw.scenes.figure_eight()
-    picture = of(scene, "rk4", scene.period / 250 if scene.period else None, steps=1000, control=sw.Projection("scaling"))
+    picture = looked_at(scene, "rk4", scene.period / 250 if scene.period else None, steps=1000, control=sw.Projection("scaling"))
     before = picture.before
-    assert before is not None
     changes = []
     for new, old in ((picture.energy_error, before.energy_error), (picture.state_error, before.state_error)):
         assert new is not None
@@ -239,11 +204,18 @@ def test_the_error_of_the_state_is_told_with_that_of_the_energy() -> None:
     assert finding(picture) == (f"control makes the energy error {words}, the state error {changes[1]:.2g} times smaller")
 
 
-def test_what_keeps_a_length_is_not_judged_by_the_energy() -> None:
+def test_what_control_is_not_judged_by_the_energy_before() -> None:
     for control in (sw.LengthControl(0.5), sw.Projection("length")):
-        picture = of(sw.scenes.conical_pendulum(), "rk4", control=control)
+        picture = looked_at(sw.scenes.conical_pendulum(), "rk4", control=control)
         assert picture.before is not None
         assert "exact motion" in finding(picture)
+    scene = sw.scenes.energy_control()
+    options: dict[str, Any] = {"tolerance": 1e-6, "at": np.linspace(0.0, 2.0, 50), "control": sw.Projection("scaling")}
+    adaptive = sw.integrate(scene.system, "dop853", v=scene.v, y=scene.y, **options)
+    for run in (controlled(steps=100), adaptive):
+        picture = own_picture(run)
+        assert picture.before is None
+        assert "without control" not in [axes.get_title(loc="left") for axes in picture.plot().axes]
 
 
 def test_control_and_none_stand_side_by_side(both: RunPicture) -> None:
@@ -252,48 +224,25 @@ def test_control_and_none_stand_side_by_side(both: RunPicture) -> None:
     assert [axes.get_title(loc="left") for axes in (left, right)] == ["without control", "with control"]
     assert left.get_xlim() == right.get_xlim()
     assert left.get_ylim() == right.get_ylim()
-    assert both.before is not None
     for axes, picture in ((left, both.before), (right, both)):
         drawn = [line.get_xydata() for line in axes.lines if len(line.get_xdata()) == len(picture.run.t)]
         assert np.array_equal(np.stack(drawn, axis=1), picture.run.y)
     with_control, without = energy.lines[:2]
     shown = without.get_ydata()
-    assert both.before.energy_error is not None
-    assert both.energy_error is not None
     assert np.array_equal(shown[1:], both.before.energy_error[1:])
     assert np.array_equal(with_control.get_ydata()[1:], both.energy_error[1:])
     legend = energy.get_legend()
-    assert legend is not None
     assert [text.get_text() for text in legend.get_texts()] == ["with control", "without"]
 
 
 def test_a_control_that_saves_the_run_says_so() -> None:
     """Standard Euler grows by √1.09 a step, past 10^308 after 16 458; a projection onto the energy holds it."""
 
-    @sw.system
-    def spring(t: Any, v: Any, y: Any) -> Any:
-        return -y
-
-    @spring.invariant
-    def energy(v: Any, y: Any) -> Any:
-        return 0.5 * (v * v + y * y)
-
-    run = sw.integrate(spring, "standard_euler", dt=0.3, steps=17_000, v=0.0, y=1.0, every=100, control=sw.Projection("energy"))
+    run = sw.integrate(free, "standard_euler", dt=0.3, steps=17_000, v=0.0, y=1.0, every=100, control=sw.Projection("energy"))
     picture = own_picture(run)
-    assert picture.before is not None
     assert picture.before.run.status
     assert int(picture.before.run.first_bad_step) == pytest.approx(308.25 / (0.5 * math.log10(1.09)), abs=20)
     assert finding(picture) == f"finite with control, diverges at step {int(picture.before.run.first_bad_step)} without"
-
-
-def test_without_a_control_or_with_a_tolerance_there_is_nothing_beside_it() -> None:
-    scene = sw.scenes.energy_control()
-    options: dict[str, Any] = {"tolerance": 1e-6, "at": np.linspace(0.0, 2.0, 50), "control": sw.Projection("scaling")}
-    adaptive = sw.integrate(scene.system, "dop853", v=scene.v, y=scene.y, **options)
-    for run in (controlled(steps=100), adaptive):
-        picture = own_picture(run)
-        assert picture.before is None
-        assert "without control" not in [axes.get_title(loc="left") for axes in picture.plot().axes]
 
 
 def test_numbers_in_words() -> None:

@@ -2,7 +2,6 @@
 
 import dataclasses
 import itertools
-import json
 import math
 import pickle
 import sys
@@ -17,15 +16,14 @@ from stepwell.views.charts import orbits_picture, runs_animation, runs_picture, 
 from stepwell.views.charts.kinds import KINDS as ROWS
 from stepwell.views.charts.kinds import kind_of
 from stepwell.views.charts.runs import own_picture
-from support.charted import read
+from support.charted import files_of
 from support.families import family
 from support.looks import faults
 from support.pictured import every_kind, every_kind_with_errors, figure_of, looked_at, picture_of, said
+from support.refusals import refused
 
-# ---- the data
 
-
-def test_a_picture_holds_the_errors_of_the_scene():
+def test_a_picture_holds_the_errors_of_the_scene_as_far_as_they_are_known():
     scene = sw.scenes.kepler()
     run = scene.run("leapfrog", every=10)
     chart = sw.charts.run_picture("kepler", run)
@@ -35,6 +33,12 @@ def test_a_picture_holds_the_errors_of_the_scene():
     numbers = {"dt": 0.01, "steps": run.steps, "kept": len(run.t), "diverged_at_step": None}
     largest = {f"largest_{name}_error": getattr(scene, f"{name}_error")(run).max() for name in ("state", "energy")}
     assert chart.summary() == {"scene": "kepler", "method": "leapfrog"} | numbers | largest
+    scene = dataclasses.replace(sw.scenes.clover(), until=3.0)
+    chart = looked_at(scene)
+    known = scene.state_error(chart.run)[chart.run.t <= 3.0]
+    assert 0 < len(known) < len(chart.run.t)
+    assert chart.summary()["largest_state_error"] == known.max()
+    assert "not known after t = 3" in [text.get_text() for axes in chart.plot().axes for text in axes.texts]
 
 
 def test_without_an_exact_solution_the_energy_is_compared_with_the_start():
@@ -48,10 +52,7 @@ def test_without_an_exact_solution_the_energy_is_compared_with_the_start():
     chart = looked_at(rest, "leapfrog", steps=10)
     np.testing.assert_allclose(chart.energy_error, np.abs(chart.run.energy / (-769 / 60) - 1), rtol=0, atol=1e-12)
     assert chart.energy_scale == "the energy at the start"
-
-
-def test_a_start_at_rest_without_energy_is_compared_with_the_largest_kinetic_energy():
-    """A ball that falls from height 0: its energy is 0 at the start, and its kinetic energy the largest where it is lowest."""
+    # A ball that falls from height 0: its energy is 0 at the start, and its kinetic energy the largest where it is lowest.
     ball = sw.Scene(sw.Particles(gravity=2.0, dim=1), v=[[0.0]], y=[[0.0]], dt=0.1, horizon=1.0)
     chart = looked_at(ball, "standard_euler")
     assert chart.energy_scale == "the largest kinetic energy of the run"
@@ -60,31 +61,20 @@ def test_a_start_at_rest_without_energy_is_compared_with_the_largest_kinetic_ene
     assert chart.energy_error.max() > 0.01
 
 
-def test_what_is_not_known_is_left_out_of_the_largest():
-    scene = dataclasses.replace(sw.scenes.clover(), until=3.0)
-    chart = looked_at(scene)
-    known = scene.state_error(chart.run)[chart.run.t <= 3.0]
-    assert 0 < len(known) < len(chart.run.t)
-    assert chart.summary()["largest_state_error"] == known.max()
-    assert "not known after t = 3" in [text.get_text() for axes in chart.plot().axes for text in axes.texts]
-
-
 def test_files_hold_the_kept_states(tmp_path):
     chart = picture_of("crash")
-    chart.to_csv(tmp_path / "run.csv")
-    rows = read(tmp_path / "run.csv")
+    rows, whole = files_of(chart, tmp_path)
     assert list(rows[0]) == ["t", "v", "y", "energy", "state_error", "energy_error"] == list(chart.rows()[0])
     assert [float(row["y"]) for row in rows[:100]] == chart.run.y[:100].tolist()
-    chart.to_json(tmp_path / "run.json")
-    whole = json.loads((tmp_path / "run.json").read_text(encoding="utf-8"), parse_constant=pytest.fail)
     assert whole["summary"]["diverged_at_step"] == chart.run.first_bad_step
     assert whole["rows"][-1]["y"] is None
-    picture_of("space").to_csv(tmp_path / "space.csv")
-    with (tmp_path / "space.csv").open(encoding="utf-8") as file:
-        assert "y[63, 2]" in file.readline()
+    assert "y[63, 2]" in files_of(picture_of("space"), tmp_path)[0][0]
 
 
-def test_what_is_no_run_of_the_scene_is_refused():
+def test_what_is_a_run_of_the_scene_and_what_is_not():
+    scene = sw.scenes.clover()
+    chart = looked_at(scene, "standard_euler", control=sw.EnergyControl(1.0))
+    assert "EnergyControl" in said(chart.plot())
     s, oscillator = sw.scenes.clover(), sw.scenes.oscillator()
     run = s.run("rk4", every=1)
     own = {"v": s.v, "dt": 0.1, "steps": 5, "every": 1}
@@ -99,17 +89,7 @@ def test_what_is_no_run_of_the_scene_is_refused():
         (s, sw.integrate(s.system, "rk4", y=2 * s.y, **own), ArgumentError, "another start or system"),
         (s, sw.integrate(s.system, "rk4", y=np.repeat(s.y[..., None], 2, -1), **own), ShapeError, "run: expected one member"),
     ):
-        with pytest.raises(error, match=message):
-            sw.charts.run_picture(scene, other)
-
-
-def test_a_controlled_run_is_a_run_of_the_scene():
-    scene = sw.scenes.clover()
-    chart = looked_at(scene, "standard_euler", control=sw.EnergyControl(1.0))
-    assert "EnergyControl" in said(chart.plot())
-
-
-# ---- the picture
+        refused(error, message, sw.charts.run_picture, scene, other)
 
 
 @every_kind
@@ -155,7 +135,7 @@ def test_orbits_are_where_the_bodies_went():
     assert [text.get_text() for text in axes.get_legend().get_texts()] == ["body 1", "body 2", "exact", "start", "end"]
 
 
-def test_bodies_in_space_are_seen_from_two_sides():
+def test_bodies_in_space_are_seen_from_two_sides_and_told_apart():
     chart = picture_of("space")
     above, side = figure_of("space").axes[:2]
     assert [(a.get_xlabel(), a.get_ylabel(), a.get_title(loc="left")) for a in (above, side)] == [
@@ -165,26 +145,20 @@ def test_bodies_in_space_are_seen_from_two_sides():
     assert np.ptp(above.get_xlim()) == pytest.approx(np.ptp(side.get_ylim()))
     for axes, plane in ((above, (0, 1)), (side, (0, 2))):
         assert np.array_equal(axes.lines[0].get_xydata(), chart.run.y[:, 0][:, plane])
-
-
-def test_bodies_are_told_apart():
-    """One hue a body, of those that tests/views/test_looks.py tells apart in grey and without green cones, too."""
+    # One hue a body, of those that tests/views/test_looks.py tells apart in grey and without green cones, too.
     looks = orbits_picture.BODIES
     assert len({look["marker"] for look in looks}) == len({look["color"] for look in looks}) == len(looks)
     assert {look["color"] for look in looks} <= set(style.FAMILIES.values())
 
 
-def test_a_long_run_does_not_hide_the_exact_orbit():
+def test_neither_a_long_run_nor_the_last_body_hides_the_others():
     chart = looked_at(sw.scenes.figure_eight(), "leapfrog", steps=3 * orbits_picture.LONG_CURVE)
     assert orbits_picture.crowded(chart, 2.4)
     lines = chart.plot().axes[0].lines
     paths = [line.get_zorder() for line in lines if len(line.get_xdata()) == len(chart.run.t)]
     exact = [line.get_zorder() for line in lines if line.get_linestyle() == "--"]
     assert min(exact) > max(paths)
-
-
-def test_bodies_on_one_curve_are_all_seen():
-    """The last one drawn would hide the others: each has its colour where it went in the last third of a period."""
+    # The last one drawn would hide the others: each has its colour where it went in the last third of a period.
     chart = looked_at(sw.scenes.clover(), "rk4")
     axes = chart.plot().axes[0]
     arcs = [line for line in axes.lines if line.get_linewidth() == 3.0]
@@ -213,16 +187,13 @@ def test_the_distance_from_the_centre_is_drawn_over_the_angle():
     assert not any(a.get_title(loc="left").startswith("distance") for a in figure_of("orbits").axes)
 
 
-def test_what_leaves_the_picture_is_said():
+def test_what_leaves_the_picture_or_the_finite_numbers_is_said():
     assert "A body leaves the picture." in said(figure_of("gone"))
     assert "The curve leaves the picture." in said(figure_of("grown"))
     for kind in ("orbits", "two", "swing", "rows", "space"):
         assert "leaves" not in said(figure_of(kind))
     low, high = figure_of("grown").axes[0].get_ylim()
     assert -4 < low < -1 < 1 < high < 4
-
-
-def test_a_diverged_run_says_when_and_is_drawn_as_far_as_it_is_finite():
     figure, step = figure_of("crash"), int(picture_of("crash").run.first_bad_step)
     assert f"Diverged at step {step} (t = {step * 100:g})" in said(figure)
     assert " not finite " in [text.get_text() for text in figure.axes[-1].texts]
@@ -275,12 +246,22 @@ def test_an_aircraft_is_drawn_by_its_angles_and_its_axes():
     np.testing.assert_allclose(parts["right wing"].get_xy()[1], [tip @ screen.right, tip @ screen.up], rtol=0, atol=1e-15)
 
 
-def test_angles_that_jump_are_broken_off():
+def test_angles_that_jump_are_broken_off_and_a_box_has_the_moments_of_the_body():
     line = figure_of("trapped").axes[0].lines[0]
     assert np.isnan(line.get_ydata()).sum() >= 1
     assert (np.abs(np.diff(line.get_ydata())[~np.isnan(np.diff(line.get_ydata()))]) <= 180.0).all()
     known, run = line.get_ydata()[~np.isnan(line.get_ydata())], picture_of("trapped").run
     np.testing.assert_array_equal(known, run.system.angles(run.y, axis=1)[:, 0])
+    for inertia in ([2.0, 3.0, 4.0], [1.0, 1.0, 1.6], [5.0, 4.0, 2.0]):
+        a, b, c = solids.half_sides(np.array(inertia))
+        moments = np.array([b * b + c * c, c * c + a * a, a * a + b * b])  # of a box: m/3 of these
+        np.testing.assert_allclose(moments / moments[0], np.array(inertia) / inertia[0], rtol=1e-14)
+        for axis in range(3):
+            faces = solids.box(np.array([a, b, c]), axis)
+            assert {fill for _, fill in faces.values()} == {solids.FRONT, solids.BACK, *solids.SIDES}
+            for name, (corners, _) in faces.items():
+                i = int(name[1]) - 1
+                assert {corner[i] for corner in corners} == {(a, b, c)[i] * (1.0 if name[0] == "+" else -1.0)}
 
 
 def turned_up(chart):
@@ -326,19 +307,6 @@ def test_a_rigid_body_is_drawn_by_the_path_of_its_axis_and_as_a_box():
     assert min(heights) < -0.9
 
 
-def test_a_box_has_the_moments_of_the_body():
-    for inertia in ([2.0, 3.0, 4.0], [1.0, 1.0, 1.6], [5.0, 4.0, 2.0]):
-        a, b, c = solids.half_sides(np.array(inertia))
-        moments = np.array([b * b + c * c, c * c + a * a, a * a + b * b])  # of a box: m/3 of these
-        np.testing.assert_allclose(moments / moments[0], np.array(inertia) / inertia[0], rtol=1e-14)
-        for axis in range(3):
-            faces = solids.box(np.array([a, b, c]), axis)
-            assert {fill for _, fill in faces.values()} == {solids.FRONT, solids.BACK, *solids.SIDES}
-            for name, (corners, _) in faces.items():
-                i = int(name[1]) - 1
-                assert {corner[i] for corner in corners} == {(a, b, c)[i] * (1.0 if name[0] == "+" else -1.0)}
-
-
 def test_the_path_of_a_top_has_the_vertical_up():
     chart = picture_of("top")
     np.testing.assert_array_equal(solids.upright(chart), np.eye(3))
@@ -380,7 +348,7 @@ def test_a_frame_is_the_attitude_of_its_time():
     assert np.abs(trail.get_xydata()[-1] - rod.get_xydata()[1]).max() < 1e-14
 
 
-def test_pictures_can_be_drawings_and_a_notebook_shows_them_without_pyplot(tmp_path):
+def test_pictures_can_be_drawings_and_a_notebook_shows_them_without_pyplot(tmp_path, monkeypatch):
     """IPython asks an object for ``_repr_png_``; what it knows of matplotlib's figures it learns from pyplot."""
     run = sw.integrate(sw.Pendulum(), "rk4", v=0.0, y=2.0, dt=0.1, steps=30, every=1)
     for ending, start in (("svg", b"<?xml"), ("pdf", b"%PDF-"), ("png", b"\x89PNG")):
@@ -388,14 +356,10 @@ def test_pictures_can_be_drawings_and_a_notebook_shows_them_without_pyplot(tmp_p
         assert (tmp_path / f"run.{ending}").read_bytes().startswith(start)
     assert figure._repr_png_() == png(figure) == (tmp_path / "run.png").read_bytes()
     assert pickle.loads(pickle.dumps(figure))._repr_png_().startswith(b"\x89PNG")
-
-
-def test_without_matplotlib_the_numbers_are_still_there(monkeypatch, tmp_path):
     chart = looked_at(sw.scenes.clover())
     monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
     for draw in (chart.plot, lambda: chart.animate(tmp_path / "run.gif")):
-        with pytest.raises(UnsupportedError, match=r"pip install 'stepwell\[chart\]'"):
-            draw()
+        refused(UnsupportedError, r"pip install 'stepwell\[chart\]'", draw)
     chart.to_csv(tmp_path / "run.csv")
 
 

@@ -14,9 +14,10 @@ from stepwell.errors import ArgumentError, DTypeError, ShapeError, UnknownNameEr
 from stepwell.views.charts import curves_picture, figures_picture, style, zplane_picture
 from stepwell.views.charts.zplane import ladder, largest
 from support import ROOT
-from support.charted import read
+from support.charted import files_of, read
 from support.families import family
 from support.looks import faults
+from support.refusals import refused
 from support.truths import CLOSED_FORMS
 
 METHODS = sw.methods()
@@ -89,19 +90,23 @@ def check_page(figure, path):
     assert faults(figure) == []
 
 
-# ---- the numbers
-
-
-def test_every_method_is_there_by_itself(chart, figures):
+def test_every_method_is_there_at_round_angles_or_those_that_are_given(chart, figures):
     assert [locus.method for locus in chart.loci] == [samples.method for samples in figures.samples] == list(METHODS)
     assert sorted(CLOSED) == sorted(set(CLOSED) & {method.name for method in METHODS})
+    assert {0.5, 1.0, 1.5, 2.0, 2.5, 3.0} <= set(chart.phi.tolist())
+    assert chart.phi[0] > 0
+    assert chart.phi[-1] >= 1.1 * max(method.limit for method in METHODS if method.limit < math.inf)
+    assert len(chart.phi) == 200 * chart.phi[-1]
+    assert (largest([0.0]), largest([2.83, math.inf]), largest([3.4641])) == (2.5, 3.5, 4.0)
+    assert ladder(0.001).tolist() == [0.001]
+    few = sw.charts.stability(["rk4", "rk4"], phi=[0.5, 3.0])
+    assert (len(few.loci), few.loci[0].stable.tolist()) == (1, [True, False])
+    assert len(few.rows()) == 2
 
 
 def test_the_eigenvalues_are_the_roots_of_the_documents_equation(chart):
-    """Sum 2p and product q. An element of P is wrong by a few eps of its largest term, and the product by that times another.
-
-    Ψ = atan2(√(q − p²), p), away from where both roots meet: there the root magnifies rounding.
-    """
+    """Sum 2p and product q. An element of P is wrong by a few eps of its largest term, and the product by that times another."""
+    # Ψ = atan2(√(q − p²), p), away from where both roots meet: there the root magnifies rounding.
     for name, closed in CLOSED.items():
         locus = of(chart, name)
         p, q = (f(locus.phi) for f in closed)
@@ -142,9 +147,6 @@ def test_limits_and_what_happens_there(chart):
         kind = "monotonic unstable" if name == "false_heun" else "unstable oscillation"
         row = next(row for row in chart.summary() if row["method"] == name)
         assert (locus.leaves, row["leaves_by"], row["limit"]) == (kind, kind, float(locus.limit)), name
-
-
-def test_at_two_both_roots_of_false_euler_are_minus_one(chart):
     locus = of(chart, "false_euler")
     i = locus.phi.tolist().index(2.0)
     assert locus.eigenvalues[:, i].tolist() == [-1, -1]
@@ -153,24 +155,9 @@ def test_at_two_both_roots_of_false_euler_are_minus_one(chart):
     assert locus.stable[i - 1]
 
 
-def test_the_ladder_is_round_and_goes_past_the_largest_limit(chart):
-    assert {0.5, 1.0, 1.5, 2.0, 2.5, 3.0} <= set(chart.phi.tolist())
-    assert chart.phi[0] > 0
-    assert chart.phi[-1] >= 1.1 * max(method.limit for method in METHODS if method.limit < math.inf)
-    assert len(chart.phi) == 200 * chart.phi[-1]
-    assert (largest([0.0]), largest([2.83, math.inf]), largest([3.4641])) == (2.5, 3.5, 4.0)
-    assert ladder(0.001).tolist() == [0.001]
-
-
-def test_angles_may_be_given():
-    chart = sw.charts.stability(["rk4", "rk4"], phi=[0.5, 3.0])
-    assert (len(chart.loci), chart.loci[0].stable.tolist()) == (1, [True, False])
-    assert len(chart.rows()) == 2
-
-
 def test_what_cannot_be_charted_is_said(chart, tmp_path):
     for arguments, error, message in (
-        ({"methods": ["rk5"]}, UnknownNameError, "did you mean 'rk4'"),
+        ({"methods": ["rk44"]}, UnknownNameError, "did you mean 'rk4'"),
         ({"methods": "rk4"}, DTypeError, "methods: expected a list of names, got 'rk4'"),
         ({"methods": []}, ArgumentError, "methods: expected at least one, got none"),
         ({"phi": [0.0, 1.0]}, ArgumentError, "phi: expected numbers above zero in rad"),
@@ -178,29 +165,22 @@ def test_what_cannot_be_charted_is_said(chart, tmp_path):
         ({"phi": []}, (ShapeError, DTypeError), "phi: expected"),
         ({"phi": [1.0, 1.0]}, ArgumentError, "phi: expected angles that rise"),
     ):
-        with pytest.raises(error, match=message):
-            sw.charts.stability(**arguments)
+        refused(error, message, sw.charts.stability, **arguments)
     for arguments, error, message in (
-        ({"methods": ["rk5"]}, UnknownNameError, "did you mean 'rk4'"),
+        ({"methods": ["rk44"]}, UnknownNameError, "did you mean 'rk4'"),
         ({"phi": -1.0}, ArgumentError, "phi: expected numbers above zero in rad"),
         ({"phi": [1.0]}, ShapeError, "phi: expected one number in rad"),
         ({"periods": 0}, ArgumentError, "periods: expected numbers above zero"),
         ({"phi": 1e-9}, ArgumentError, "periods: 4 periods with Φ = 1e-09 are 2.51e.10 steps, expected 100000 or fewer"),
     ):
-        with pytest.raises(error, match=message):
-            sw.charts.figures(**arguments)
+        refused(error, message, sw.charts.figures, **arguments)
     with pytest.raises(ArgumentError, match="method: expected one of these figures, rk4, got 'verlet'"):
         sw.charts.figures(["rk4"]).plot(method="verlet")
-    with pytest.raises(UnknownNameError, match="kind: there is no 'locus'; did you mean 'loci'"):
-        chart.plot(kind="locus")
-    with pytest.raises(ArgumentError, match="expected an ending of a picture"):
-        chart.plot(tmp_path / "chart.docx")
+    refused(UnknownNameError, "kind: there is no 'locus'; did you mean 'loci'", chart.plot, kind="locus")
+    refused(ArgumentError, "expected an ending of a picture", chart.plot, tmp_path / "chart.docx")
 
 
-# ---- files
-
-
-def test_the_csv_reads_back_as_the_same_numbers(figures, tmp_path):
+def test_the_files_read_back_as_the_same_numbers(figures, tmp_path):
     chart = sw.charts.stability(phi=[0.5, 1.0, 3.0])
     chart.to_csv(tmp_path / "stability.csv")
     rows = read(tmp_path / "stability.csv")
@@ -221,23 +201,15 @@ def test_the_csv_reads_back_as_the_same_numbers(figures, tmp_path):
             assert [float(row[name]) for row in own] == values.tolist()
     for case in figures.harmonic:
         assert [float(row["y"]) for row in rows if row["method"] == case.name] == case.y.tolist()
-
-
-def test_the_json_is_strict_and_whole(figures, tmp_path):
     chart = sw.charts.stability(phi=[0.5, 1.0])
-    chart.to_json(tmp_path / "stability.json")
-    whole = json.loads((tmp_path / "stability.json").read_text(encoding="utf-8"), parse_constant=pytest.fail)
+    _, whole = files_of(chart, tmp_path)
     assert len(whole["rows"]) == len(chart.rows())
     assert [row["method"] for row in whole["summary"]] == [method.name for method in METHODS]
     euler, rk4 = (next(row for row in whole["summary"] if row["method"] == name) for name in ("standard_euler", "rk4"))
     assert (euler["samples_per_period"], euler["r1_squared_minus_1"]) == (None, "Φ²")
     assert (rk4["r1_squared_minus_1"], rk4["frequency_deviation"]) == ("−Φ⁶/72 + Φ⁸/576", "−Φ⁴/120 + Φ⁶/336")
-    figures.to_json(tmp_path / "figures.json")
-    whole = json.loads((tmp_path / "figures.json").read_text(encoding="utf-8"), parse_constant=pytest.fail)
+    _, whole = files_of(figures, tmp_path)
     assert (whole["phi"], len(whole["summary"]), len(whole["rows"])) == (0.5, len(METHODS), len(figures.rows()))
-
-
-# ---- pictures of the z-plane
 
 
 def panels(figure, chart):
@@ -361,25 +333,20 @@ def test_the_curves_of_few_methods_are_exact_and_series_with_the_limit():
             assert upright == ([float(locus.limit)] if 0.0 < locus.limit < math.inf else [])
         assert radius.get_yscale() == "symlog"
         assert any(patch.get_hatch() for patch in radius.patches)
-    assert figure.axes[0].get_ylabel() == "r₁² − 1"
-    assert figure.axes[1].get_ylabel() == "Ψ/Φ"
+    assert (figure.axes[0].get_ylabel(), figure.axes[1].get_ylabel()) == ("r₁² − 1", "Ψ/Φ")
     assert figure.axes[-1].get_xlabel() == "Φ = ω₀·dt (rad)"
 
 
 def test_without_matplotlib_the_numbers_are_still_there(chart, figures, monkeypatch, tmp_path):
     monkeypatch.setitem(__import__("sys").modules, "matplotlib.figure", None)
     for draw in (chart.plot, figures.plot, lambda: figures.plot(method="rk4"), lambda: figures.save(tmp_path / "no")):
-        with pytest.raises(UnsupportedError, match=r"pip install 'stepwell\[chart\]'"):
-            draw()
+        refused(UnsupportedError, r"pip install 'stepwell\[chart\]'", draw)
     assert not (tmp_path / "no").exists()
     chart.to_csv(tmp_path / "chart.csv")
     figures.to_csv(tmp_path / "figures.csv")
 
 
-# ---- the document's figures
-
-
-def test_the_samples_are_powers_of_the_transition_matrix(figures):
+def test_the_samples_are_powers_of_the_transition_matrix_and_those_of_verlet_a_cosine(figures):
     for samples in figures.samples:
         if samples.method.carry:
             continue
@@ -389,9 +356,6 @@ def test_the_samples_are_powers_of_the_transition_matrix(figures):
             # Rounding of a step, carried on by a matrix whose powers stay below 300 in 51 steps.
             assert (v, y) == pytest.approx(tuple(state), abs=1e-11)
             state = P @ state
-
-
-def test_verlet_samples_are_a_cosine_of_its_own_frequency(figures):
     samples = next(s for s in figures.samples if s.method.name == "verlet")
     psi = math.acos(1 - 0.5**2 / 2)
     assert samples.ratio == pytest.approx(psi / 0.5)
@@ -419,8 +383,7 @@ def test_the_harmonic_cases_of_section_4(figures, tmp_path):
         assert dots.get_xdata() == pytest.approx(np.arange(len(case.y)) * case.degrees / 360)
         assert f"{case.samples_per_period:g} samples per period" in axes.get_title(loc="left")
     assert sw.charts.figures(["rk4"]).harmonic == ()
-    with pytest.raises(ArgumentError, match="harmonic cases of §4"):
-        sw.charts.figures(["rk4"]).plot_harmonic()
+    refused(ArgumentError, "harmonic cases of §4", sw.charts.figures(["rk4"]).plot_harmonic)
 
 
 def test_the_figures_show_what_the_document_says(figures):
@@ -440,7 +403,7 @@ def test_the_figures_show_what_the_document_says(figures):
     assert figures.samples[0].t[-1] >= 4 * 2 * math.pi > figures.samples[0].t[-2]
 
 
-def test_files_of_the_figures(figures, tmp_path):
+def test_files_of_the_figures_and_room_for_long_titles(figures, tmp_path):
     """One of each method and one of all, of a few methods."""
     few = sw.charts.figures(["standard_euler", "false_euler"])
     paths = few.save(tmp_path / "to" / "be")
@@ -452,11 +415,14 @@ def test_files_of_the_figures(figures, tmp_path):
     assert len({samples.file for samples in figures.samples}) == len(METHODS)
     method = SimpleNamespace(name="new_one", section="no section")
     assert dataclasses.replace(figures.samples[0], method=method).file == "99-new_one.png"
+    figures = sw.charts.figures(["standard_euler", "false_euler", "verlet", "false_heun", "rk4"], phi=2.0)
+    check_page(figures.plot(tmp_path / "overview.png"), tmp_path / "overview.png")
+    text = figures.plot(method="false_euler").texts[2].get_text()
+    assert "unstable oscillation (double eigenvalue -1)" in text
 
 
 @pytest.mark.parametrize(
-    "method",
-    family(METHODS, lambda m: m.name in ("standard_euler", "false_heun", "verlet", "fehlberg"), lambda m: m.name),
+    "method", family(METHODS, lambda m: m.name in ("standard_euler", "false_heun", "verlet", "fehlberg"), lambda m: m.name)
 )
 def test_a_picture_of_one_method(figures, method, tmp_path):
     """Both curves are in it, and what grows is told."""
@@ -490,13 +456,6 @@ def test_a_figure_of_what_leaves_the_finite_numbers_is_still_drawn(tmp_path):
     assert not np.isfinite(figures.samples[0].y).all()
     figures.save(tmp_path)
     figures.to_json(tmp_path / "figures.json")
-
-
-def test_a_double_eigenvalue_has_room_in_the_titles(tmp_path):
-    figures = sw.charts.figures(["standard_euler", "false_euler", "verlet", "false_heun", "rk4"], phi=2.0)
-    check_page(figures.plot(tmp_path / "overview.png"), tmp_path / "overview.png")
-    text = figures.plot(method="false_euler").texts[2].get_text()
-    assert "unstable oscillation (double eigenvalue -1)" in text
 
 
 def test_the_pictures_of_the_docs_show_every_method(written):

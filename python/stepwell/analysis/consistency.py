@@ -19,8 +19,11 @@ from .stability import maps
 MOST_PASSES = 50
 #: A pass that changes no number by more than this share of the largest is the last one.
 ROUNDING = 1e-14
-#: Algebraic equations whose derivatives by the numbers that they are for are as near to a singular matrix count as singular.
-WORST_CONDITION = 1e13
+#: Algebraic equations do not determine the numbers that they are for if the least singular value of the derivatives is below this
+#: share of their terms.
+LEAST_DETERMINED = 1e-11
+#: Algebraic equations do not hold at a state that they would change by more than this share of the size of a number.
+MOST_BROKEN = 0.1
 #: The share of the largest component that counts as rounding.
 LEAST = 1e-12
 #: The part of a step over which equations are compared for their derivative by the time.
@@ -79,7 +82,7 @@ def _own(system: System) -> tuple[int, ...]:
 
 def correction(system: System, y: Array, t: Any) -> Array:
     """The change of states by one pass of Newton's method for the algebraic equations, of the shape of y."""
-    equations = _Algebraic(system, y, t)
+    equations = _Algebraic(system, y, t).determined()
     return equations.change(-equations.values[equations.places]).reshape(y.shape)
 
 
@@ -89,7 +92,7 @@ def rates(system: System, y: Array, t: Any, h: Any) -> Array:
     The equations go on to hold: their derivatives along ẏ, and by the time, add up to zero. The latter are differences over a
     part of the length h, since rates serve to see which way a quantity goes.
     """
-    equations = _Algebraic(system, y, t)
+    equations = _Algebraic(system, y, t).determined()
     known = equations.values.copy()
     known[equations.places] = 0.0
     ahead, behind = (_Algebraic(system, y, t + sign * PART * h).values[equations.places] for sign in (1.0, -1.0))
@@ -105,51 +108,89 @@ class _Algebraic:
         values: the right-hand sides of all equations, shape (n, *members).
         matrix: their derivatives, shape (n, n, *members).
         places: which equations are algebraic.
+        along: the derivatives of the algebraic ones along the vectors that M takes to zero, shape (count, count, *members).
+        singular: whether they determine nothing at a member's state.
     """
 
     def __init__(self, system: System, y: Array, t: Any) -> None:
         assert system.mass_matrix is not None
-        self._system, self._rows = system, system.mass_matrix.rows
+        self._system, matrix_rows = system, system.mass_matrix.rows
         members = y.shape[len(system.y_shape) :]
         with np.errstate(all="ignore"):
             self.matrix, self.values = traced.matrix(system, "equations", None, members, np.empty((0, *members)), y, t)
-        self.places = [number for number, row in enumerate(self._rows) if not row]
+        self.places = [number for number, row in enumerate(matrix_rows) if not row]
+        count = len(self.places)
+        # One such vector for each algebraic equation, as the other rows of M are [I, B].
+        self._null = np.zeros((len(self.values), count))
+        for i, place in enumerate(self.places):
+            self._null[place, i] = 1.0
+            for row, entries in enumerate(matrix_rows):
+                self._null[row, i] -= dict(entries).get(place, 0.0)
+        with np.errstate(all="ignore"):
+            products = [
+                self.matrix[self.places][:, number, np.newaxis] * self._null[number].reshape(1, -1, *(1,) * len(members))
+                for number in np.flatnonzero(self._null.any(axis=1))
+            ]
+            self.along, terms = np.asarray(sum(products)), np.asarray(sum(map(np.abs, products)))
+        self.singular = _singular(_stacked(self.along), _stacked(terms)).reshape(members)
 
     def change(self, right: Array) -> Array:
         """The change of states, along the vectors that M takes to zero, by which the algebraic equations change so."""
-        count, members = len(self.places), self.values.shape[1:]
-        # One such vector for each algebraic equation, as the other rows of M are [I, B].
-        null = np.zeros((len(self.values), count))
-        for i, place in enumerate(self.places):
-            null[place, i] = 1.0
-            for row, entries in enumerate(self._rows):
-                null[row, i] -= dict(entries).get(place, 0.0)
+        count = len(self.places)
         with np.errstate(all="ignore"):
-            along: Any = sum(
-                self.matrix[self.places][:, number, np.newaxis] * null[number].reshape(1, -1, *(1,) * len(members))
-                for number in np.flatnonzero(null.any(axis=1))
-            )
-            _determined(self._system, np.moveaxis(np.reshape(along, (count, count, -1)), -1, 0))
-            rows = [[along[i, j] if np.any(along[i, j]) else None for j in range(count)] for i in range(count)]
+            rows = [[self.along[i, j] if np.any(self.along[i, j]) else None for j in range(count)] for i in range(count)]
             shares = pivoting.solved(pivoting.factored(rows), list(right))
             change = np.zeros(self.values.shape)
-            for share, vector in zip(shares, null.T, strict=True):
+            for share, vector in zip(shares, self._null.T, strict=True):
                 for at in np.flatnonzero(vector):
                     change[at] += vector[at] * share
         return change
 
+    def sides(self) -> Array:
+        """The sign of the determinant of ``along``, which changes where the equations determine nothing in between."""
+        with np.errstate(all="ignore"):
+            return np.asarray(np.linalg.slogdet(_stacked(self.along))[0]).reshape(self.singular.shape)
 
-def _determined(system: System, matrices: Array) -> None:
-    """Raise if the algebraic equations do not determine the numbers that they are for, as with an index above 1."""
-    finite = matrices[np.isfinite(matrices).all(axis=(1, 2))]
-    sizes = np.abs(finite).max(axis=2, keepdims=True, initial=0.0)
-    with np.errstate(all="ignore"):
-        condition = np.linalg.cond(finite / np.where(sizes > 0.0, sizes, 1.0)) if len(finite) else np.zeros(0)
-    if not (condition < WORST_CONDITION).all():
-        raise UnsupportedError(
-            f"mass: the algebraic equations of {system!r} do not determine the numbers that they are for (their index is above "
-            f"1); put the derivative of the constraint by the time, with the rates put in, in its place"
-        )
+    def determined(self) -> _Algebraic:
+        """These equations, or an error if they do not determine the numbers that they are for."""
+        if self.singular.any():
+            raise UnsupportedError(
+                f"mass: the algebraic equations of {self._system!r} do not determine the numbers that they are for (their index "
+                f"is above 1); put the derivative of the constraint by the time, with the rates put in, in its place"
+            )
+        return self
+
+
+def _stacked(matrices: Array) -> Array:
+    """Matrices of shape (n, n, *members) as a row of matrices."""
+    return np.moveaxis(matrices.reshape(*matrices.shape[:2], -1), -1, 0)
+
+
+def lost(system: System, start: tuple[Array, Any], end: tuple[Array, Any], sizes: Array) -> tuple[Any, Any]:
+    """The members that lost their algebraic equations on the way from a state and time to others.
+
+    Returns:
+        Those at whose end these would change a number by more than ``MOST_BROKEN`` of its size or determine none, and those of
+        which they determined nothing at a place in between.
+    """
+    equations = _Algebraic(system, *end)
+    change = np.abs(equations.change(-equations.values[equations.places])).reshape(end[0].shape)
+    broken = (change > MOST_BROKEN * sizes).any(axis=_own(system)) | equations.singular
+    return np.asarray(broken), np.asarray(_Algebraic(system, *start).sides() * equations.sides() < 0.0)
+
+
+def _singular(matrices: Array, terms: Array) -> np.ndarray[Any, np.dtype[np.bool_]]:
+    """Whether algebraic equations do not determine the numbers that they are for, as with an index above 1.
+
+    Of a full M their derivatives are sums, of which an index above 1 leaves rounding: that is little beside the ``terms``.
+    """
+    finite = np.asarray(np.isfinite(matrices).all(axis=(1, 2)))
+    matrices, terms = (np.where(finite[:, np.newaxis, np.newaxis], each, np.eye(each.shape[1])) for each in (matrices, terms))
+    rows = terms.max(axis=2, keepdims=True)
+    rows = np.where(rows > 0.0, rows, 1.0)
+    columns = (terms / rows).max(axis=1, keepdims=True)
+    scaled = matrices / rows / np.where(columns > 0.0, columns, 1.0)
+    return np.asarray(np.linalg.svd(scaled, compute_uv=False)[:, -1] <= LEAST_DETERMINED)
 
 
 def check_start(system: System, y: Array, t: Any, relative: Any, absolute: Any) -> None:

@@ -13,13 +13,17 @@ from ..base.arrays import Array, Shape, Whole
 from ..base.checks import once_of
 from ..base.immutable import by_value
 from ..base.reprs import first_of, share
-from ..errors import AccuracyWarning, UnsupportedError
+from ..errors import AccuracyWarning, DivergenceWarning, UnsupportedError
+from ..model.compatibility import TURNING
 from ..model.methods import Method
 from ..model.systems import NBody, System
-from ..runs.findings import Finding, warn_of
+from ..runs.findings import Finding, at_places, may_have_amounts, warn_of
 
 #: A state is looked at once it is this many times as long as at the start; from rest, once it is this many units long.
 GROWN = 1e6
+
+#: The same where a force may turn the velocity: some methods then grow by a little at every step, however short.
+GROWN_OF_TURNING = 10.0
 
 #: So many numbers are compared at once.
 AT_ONCE = 4096
@@ -39,6 +43,11 @@ SMALL_SYSTEM = 8
 #: A world first checks its state after ``FIRST_CHECK`` steps. Each interval is twice the one before, up to ``LAST_CHECK`` steps:
 #: by then a state that grows by a thousandth a step has grown a millionfold. Calls of ``step`` may be shorter or longer.
 FIRST_CHECK, LAST_CHECK, ENDLESS = 8, 16_384, 1 << 62
+
+
+def _grown(system: System) -> float:
+    """From which growth on a state is looked at."""
+    return GROWN_OF_TURNING if system.uncontrolled.velocity_term in TURNING else GROWN
 
 
 def lengths(system: System, v: Array, y: Array) -> Array:
@@ -82,10 +91,9 @@ class Growth(NamedTuple):
 
     def finding(self, shape: Shape) -> Finding:
         """The finding for a batch of this shape."""
-        size, members = math.prod(shape), np.zeros(shape, dtype=bool)
-        members.reshape(-1)[self.members] = True
+        size = math.prod(shape)
         text = f"{share(self.number, shape, size)} {self.size}{first_of(self.number, self.first, size)}: {self.why}"
-        return Finding(AccuracyWarning, text, members)
+        return at_places(AccuracyWarning, text, self.members, shape)
 
 
 def growth(
@@ -105,7 +113,7 @@ def growth(
     with np.errstate(all="ignore"):
         before, after = lengths(system, *start), lengths(system, *end)
         before = np.where(before > 0.0, before, 1.0)
-        many = np.isfinite(after) & (after / before > GROWN)
+        many = np.isfinite(after) & (after / before > _grown(system))
     n = math.prod(system.v_shape) + math.prod(system.y_shape)
     if (
         not many.any()
@@ -193,7 +201,7 @@ class _Factors:
         else:
             limit = _limit(own, self._method, v, y, t)
         if limit == 0.0:
-            return f"{self._method.name} is stable with no step here, use another method"
+            return f"{self._method.name} is stable with no step here: take rk4 with a short one, or implicit_midpoint"
         return f"its stability limit is {limit:.6g}" if limit < dt else "use a shorter step"
 
 
@@ -240,10 +248,10 @@ def _of_run(run: Any, start: tuple[Array, Array], steps: int) -> Growth | None:
 def _is_tame(run: Any, start: tuple[Array, Array]) -> bool:
     """Whether it is certain, without the length of each member, that none has grown: so it is for nearly all runs.
 
-    Then all numbers at the end, taken as one vector, are at most ``GROWN`` times as long as the shortest member at the start.
+    Then all numbers at the end, taken as one vector, are not so many times as long as the shortest member at the start.
     """
     after = math.sqrt(_square(run.v[-1]) + _square(run.y[-1]))
-    return any(least > SQUARABLE and after <= GROWN * least for least in _shortest(run, start))
+    return any(least > SQUARABLE and after <= _grown(run.system) * least for least in _shortest(run, start))
 
 
 def _shortest(run: Any, start: tuple[Array, Array]) -> Iterator[float]:
@@ -281,14 +289,18 @@ def _smallest(numbers: Array) -> float:
 
 
 def watched(
-    make: Callable[..., None], loop: Any, system: System, method: Method, dt: float, v: Array, y: Array
+    make: Callable[..., bool], loop: Any, system: System, method: Method, dt: float, v: Array, y: Array, grows: bool
 ) -> Callable[..., None]:
-    """``make``, the ``step`` of a world, with checks of the state now and then that warn once of growth by steps alone."""
-    if v.size + y.size > MOST_NUMBERS:
-        return make
-    start = np.array(v, dtype=np.float64), np.array(y, dtype=np.float64)
+    """``make``, the ``step`` of a world, that warns once if the state is no longer finite.
+
+    With ``grows``, it checks the state now and then as well, and warns once of growth by steps alone.
+    """
+    grows = grows and v.size + y.size <= MOST_NUMBERS
+    start = (np.array(v, dtype=np.float64), np.array(y, dtype=np.float64)) if grows else (v, y)
     first, t0 = loop.step_number, loop.t
-    left = every = FIRST_CHECK
+    every, has_diverged = FIRST_CHECK, False
+    left = every if grows else ENDLESS
+    waits, pause = 0, 1
 
     def check() -> int:
         """Check the state, and return the number of steps until the next check, ``ENDLESS`` if there is none."""
@@ -302,12 +314,42 @@ def watched(
         every *= 2
         return every if every <= LAST_CHECK else ENDLESS
 
+    def diverged() -> None:
+        nonlocal has_diverged
+        has_diverged = True
+        both = zip((v, y), (system.v_shape, system.y_shape), strict=True)
+        lost = np.any([~np.isfinite(block).all(axis=tuple(range(len(own)))) for block, own in both], axis=0)
+        which = first_of(int(lost.sum()), tuple(np.argwhere(lost)[0].tolist()), lost.size)
+        where = f"step {loop.step_number} (t = {loop.t:g}), by {method.name} with dt = {dt:g}"
+        text = f"{share(int(lost.sum()), lost.shape, lost.size, 'the state')} diverged{which}, before {where}"
+        warn_of([Finding(DivergenceWarning, text, lost)], 3)
+
     def step(n: int = 1) -> None:
         """Make n steps in place."""
         nonlocal left
-        make(n)
+        if make(n) and not has_diverged:
+            diverged()
         left -= n or 1  # None is one step, too
         if left <= 0:
             left = check()
 
-    return step
+    if not (grows and y.size and may_have_amounts(system)):
+        return step
+    from ..runs.negative import negative  # only such worlds need it
+
+    def step_of_amounts(n: int = 1) -> None:
+        """Make n steps in place; after calls 1, 2, 4, … negative numbers are looked for, which takes ten times a short step."""
+        nonlocal waits, pause
+        waits -= 1
+        looks = waits <= 0 and not y.min() < 0.0  # else it was set so
+        step(n)
+        if waits > 0:
+            return
+        waits = pause = min(2 * pause, LAST_CHECK)
+        if not looks or loop.changes or not y.min() < 0.0:
+            return
+        if (amounts := negative(system, method, (start[1], y), loop.t)) is not None:
+            warn_of([amounts.finding(v.shape[len(system.v_shape) :])], 2)
+            waits = ENDLESS
+
+    return step_of_amounts

@@ -30,7 +30,7 @@ from ..reference import adaptive
 from ..runs import engine
 from ..runs.events.attempts import attempted
 from ..runs.events.members import Members
-from ..runs.findings import Finding
+from ..runs.findings import Finding, at_places
 from ..runs.request import Request
 from ..runs.result import Run, Status
 
@@ -60,6 +60,8 @@ MOST_RATES, ITERATIONS = 256, 40
 MOST_NUMBERS = 1_000_000
 #: The fraction of a number by which it is changed to approximate a derivative: half of its digits.
 PART = 2.0**-26
+#: Below it, that fraction of a number would underflow.
+LEAST = np.finfo(np.float64).tiny / PART
 
 
 class Stand(NamedTuple):
@@ -115,6 +117,12 @@ class Course(NamedTuple):
     y: Array
     way: float
 
+    def walls(self, members: Whole) -> Array | None:
+        """``jumps`` of some members."""
+        if self.jumps is None or self.jumps.ndim == 1:
+            return self.jumps
+        return np.broadcast_to(self.jumps, (len(self.jumps), *self.plan.batch)).reshape(len(self.jumps), -1)[:, members]
+
 
 @by_value
 class Stiff(NamedTuple):
@@ -155,21 +163,20 @@ def finding_of(run: Run, request: Request, waypoints: Array) -> Finding | None:
     stiff = stiff_members(course_of(run, request), waypoints)
     if stiff is None:
         return None
-    members = np.zeros(run.status.shape, dtype=bool)
-    members.reshape(-1)[stiff.members] = True
-    who = f"{share(stiff.number, members.shape, members.size)}{first_of(stiff.number, stiff.first, members.size)}"
-    return Finding(StiffnessWarning, f"{HELD_DOWN} {who}{';' if members.size > 1 else ':'} {stiff.why}", members)
+    shape, size = run.status.shape, run.status.size
+    text = f"{HELD_DOWN} {share(stiff.number, shape, size)}{first_of(stiff.number, stiff.first, size)}"
+    return at_places(StiffnessWarning, f"{text}{';' if size > 1 else ':'} {stiff.why}", stiff.members, shape)
 
 
 def stiff_members(course: Course, waypoints: Array) -> Stiff | None:
     """The members whose steps were held down by stability, and that did not stop; None if there is none."""
-    if course.plan.method.is_always_stable or not (seen := _suspects(course.plan, waypoints)):
+    if course.plan.method.is_always_stable or not (seen := suspects(course.plan, waypoints)):
         return None
     status = course.status.reshape(-1)[seen]
-    suspects = np.array(seen)[(status == Status.OK) | (status == Status.EVENT)]
-    if not suspects.size:
+    members = np.array(seen)[(status == Status.OK) | (status == Status.EVENT)]
+    if not members.size:
         return None
-    verdicts = _verdicts(course, _stands(course, waypoints, suspects))
+    verdicts = _verdicts(course, stands_of(course, waypoints, members))
     stiff = np.array([verdict.ratio > 0.0 for verdict in verdicts])
     held = stiff.sum(axis=0) >= 2
     if not held.any():
@@ -178,8 +185,8 @@ def stiff_members(course: Course, waypoints: Array) -> Stiff | None:
     verdict = verdicts[int(stiff[:, k].argmax())]
     limit = _in_words(course.plan, verdict, k, f"at t = {verdict.t[k]:g}")
     why = f"{limit}, where the tolerance allows {_times(verdict.ratio[k])} as long (stiff equations); {_advice(course)}"
-    first = np.unravel_index(int(suspects[k]), course.status.shape) if course.status.shape else ()
-    return Stiff(suspects[held], tuple(map(int, first)), why)
+    first = np.unravel_index(int(members[k]), course.status.shape) if course.status.shape else ()
+    return Stiff(members[held], tuple(map(int, first)), why)
 
 
 def held_by_stability(run: Run, request: Request, waypoints: Sequence[Array], index: Shape) -> str:
@@ -189,7 +196,7 @@ def held_by_stability(run: Run, request: Request, waypoints: Sequence[Array], in
         return ""
     place = np.array([np.ravel_multi_index(index, course.status.shape) if index else 0])
     rows = waypoints[0] if waypoints else None
-    verdicts = _verdicts(course, _stands(course, rows, place))
+    verdicts = _verdicts(course, stands_of(course, rows, place))
     stiff = [bool(verdict.ratio[0] > 0.0) for verdict in verdicts]
     if not (stiff[0] or sum(stiff) >= 2):
         return ", not held down by stability"
@@ -223,7 +230,7 @@ def _advice(course: Course) -> str:
     return "SciPy's Radau and LSODA are for them" if instead is None else f'"{instead.name}" is stable there'
 
 
-def _suspects(plan: engine.Plan, waypoints: Array) -> list[int]:
+def suspects(plan: engine.Plan, waypoints: Array) -> list[int]:
     """The members whose steps to their waypoints moved them as little as those that stability holds down.
 
     Nearly all members are known to be no such by one number of their state, so they are looked at one by one, in floats; of
@@ -245,7 +252,7 @@ def _by_the_last_group(plan: engine.Plan, waypoints: Array, groups: list[list[in
     """The members of which a number of the last group hardly moved, as ``_hardly_moves`` has it."""
     n, count = sum(map(len, groups)), len(groups)
     place, size = groups[-1][0], waypoints[:, 2 * n + engine.PACE_NUMBERS + count - 1]
-    own = 2 * n + engine.PACE_NUMBERS + count
+    own = 2 * n + engine.PACE_NUMBERS + engine.SCALES * count
     rows = (own + count - 1, own + 2 * count - 1) if plan.acceptance.own else (2 * n + engine.RELATIVE, 2 * n + engine.ABSOLUTE)
     with np.errstate(all="ignore"):
         tolerated = waypoints[:, rows[1]] + waypoints[:, rows[0]] * size
@@ -262,13 +269,14 @@ def _places(groups: tuple[int, ...], n_v: int, n_y: int) -> list[list[int]]:
     return [[i for i in range(n) if groups[i] == group] for group in sorted(set(groups))]
 
 
-def _hardly_moves(row: list[float], groups: list[list[int]], of_v: int, own: bool, exponent: float, lost: float) -> bool:
+def _hardly_moves(row: list[float], groups: list[list[int]], of_v: int, has_own: bool, exponent: float, lost: float) -> bool:
     """Whether the step to a waypoint moved a member as little as one that stability holds down.
 
     The largest sizes so far stand for the present ones, which allows rather more than is tolerated.
     """
     n, count = sum(map(len, groups)), len(groups)
     first = 2 * n + engine.PACE_NUMBERS
+    own = first + engine.SCALES * count
     if not row[2 * n + engine.COUNTS.start] > 0.0:
         return False
     relative, absolute = row[2 * n + engine.RELATIVE], row[2 * n + engine.ABSOLUTE]
@@ -276,8 +284,8 @@ def _hardly_moves(row: list[float], groups: list[list[int]], of_v: int, own: boo
         size = longest = row[first + group]
         if lost and group < of_v:
             size = max(size, lost / row[2 * n + engine.STEP] * max(row[first + of_v : first + count]))
-        if own:
-            relative, absolute = row[first + count + group], row[first + 2 * count + group]
+        if has_own:
+            relative, absolute = row[own + group], row[own + count + group]
         tolerated = absolute + relative * size
         step = PART_OF_A_STEP * longest * (tolerated / longest) ** exponent if longest > 0.0 else 0.0
         moved = abs(row[n + places[0]] - row[places[0]])
@@ -292,7 +300,7 @@ def _rounding(plan: engine.Plan) -> float:
     return adaptive.SINGLE_ROUNDING if plan.single else adaptive.ROUNDING
 
 
-def _stands(course: Course, waypoints: Array | None, members: Whole) -> list[Stand]:
+def stands_of(course: Course, waypoints: Array | None, members: Whole) -> list[Stand]:
     """Where members stand at the end, and where they stood at their last waypoints, the later one first."""
     system, size = course.plan.system, course.status.size
     shapes = system.v_shape, system.y_shape
@@ -320,9 +328,7 @@ def _verdicts(course: Course, stands: Sequence[Stand]) -> list[Held]:
 
 def _held(course: Course, stand: Stand) -> Held:
     """What holds down the steps from where members stand."""
-    plan, jumps = Members(course.plan._replace(progress=None)).plan(stand.members), course.jumps
-    if jumps is not None and jumps.ndim > 1:
-        jumps = np.broadcast_to(jumps, (len(jumps), *course.plan.batch)).reshape(len(jumps), -1)[:, stand.members]
+    plan, jumps = Members(course.plan._replace(progress=None)).plan(stand.members), course.walls(stand.members)
     paces = np.array(stand.paces)
     paces[[engine.EXTRA, engine.HELD, *range(engine.COUNTS.start, engine.COUNTS.stop)]] = 0.0
     t, most = paces[engine.TIME], paces[engine.MOST_STEP].copy()
@@ -416,29 +422,37 @@ def _fastest(plan: engine.Plan, members: Whole, t: Array, v: Array, y: Array) ->
         v: their velocities.
         y: their coordinates.
     """
-    n_v = prod(plan.system.v_shape)
-    n, count = n_v + prod(plan.system.y_shape), len(members)
-    flat = [block.reshape(block.size // count, count) for block in (v, y)]
-    state = np.concatenate(flat)
-    lengths = np.concatenate([np.broadcast_to(np.sqrt((block * block).sum(axis=0)), block.shape) for block in flat])
-    least = np.finfo(np.float64).tiny / PART  # below it, that fraction of the number would underflow
-    scale = np.where(lengths >= least, lengths, 1.0)
-    if n > MOST_RATES:
-        return _by_iteration(_rates(plan, members, t), state, PART * scale)
-    scale = np.where(np.abs(state) >= least, np.abs(state), scale)
-    # The states, and each with one of its numbers changed, are members side by side.
-    changed = np.repeat(state[:, np.newaxis], n + 1, axis=1)
-    changed[np.arange(n), np.arange(1, n + 1)] += PART * scale
-    every = np.tile(np.arange(count), n + 1)
-    rates = _rates(plan, members[every], t[every])(changed.reshape(n, -1)).reshape(n, n + 1, count)
-    change = changed[np.arange(n), np.arange(1, n + 1)] - state
-    matrix = np.moveaxis((rates[:, 1:] - rates[:, :1]) / change, -1, 0)
-    values = np.linalg.eigvals(np.where(np.isfinite(matrix).all(axis=(1, 2), keepdims=True), matrix, 0.0))
+    state, scale = _scaled(v, y, len(members))
+    if len(state) > MOST_RATES:
+        return _by_iteration(rates_of(plan, members, t), state, PART * scale)
+    values = np.linalg.eigvals(derivatives_of(plan, members, t, v, y))
     largest: Complex = np.take_along_axis(values, np.abs(values).argmax(axis=1)[:, np.newaxis], 1)[:, 0].astype(np.complex128)
     return largest
 
 
-def _rates(plan: engine.Plan, members: Whole, t: Array) -> Callable[[Array], Array]:
+def _scaled(v: Array, y: Array, count: int) -> tuple[Array, Array]:
+    """The states of so many members as rows, and the length of the block of each number, 1 where it underflows."""
+    flat = [block.reshape(block.size // count, count) for block in (v, y)]
+    lengths = np.concatenate([np.broadcast_to(np.sqrt((block * block).sum(axis=0)), block.shape) for block in flat])
+    return np.concatenate(flat), np.where(lengths >= LEAST, lengths, 1.0)
+
+
+def derivatives_of(plan: engine.Plan, members: Whole, t: Array, v: Array, y: Array) -> Array:
+    """The derivatives of the rates, shape (members, rates, numbers), by differences; zero where they are not finite."""
+    state, scale = _scaled(v, y, len(members))
+    n, count = state.shape
+    scale = np.where(np.abs(state) >= LEAST, np.abs(state), scale)
+    # The states, and each with one of its numbers changed, are members side by side.
+    changed = np.repeat(state[:, np.newaxis], n + 1, axis=1)
+    changed[np.arange(n), np.arange(1, n + 1)] += PART * scale
+    every = np.tile(np.arange(count), n + 1)
+    rates = rates_of(plan, members[every], t[every])(changed.reshape(n, -1)).reshape(n, n + 1, count)
+    change = changed[np.arange(n), np.arange(1, n + 1)] - state
+    matrix = np.moveaxis((rates[:, 1:] - rates[:, :1]) / change, -1, 0)
+    return np.where(np.isfinite(matrix).all(axis=(1, 2), keepdims=True), matrix, 0.0)
+
+
+def rates_of(plan: engine.Plan, members: Whole, t: Array) -> Callable[[Array], Array]:
     """The rates of some members as a function of their states, rows of numbers."""
     plan = Members(plan).plan(members)
     unit, n_v, shapes = engine.attempted_system(plan).unit, prod(plan.system.v_shape), (plan.system.v_shape, plan.system.y_shape)

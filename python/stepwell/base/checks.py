@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import operator
 import sys
-from collections.abc import Iterable, Sequence, Sized
+from collections.abc import Callable, Iterable, Mapping, Sequence, Sized
+from functools import wraps
 from itertools import islice
 from math import isfinite, prod
 from numbers import Real
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 
 import numpy as np
 
@@ -24,6 +25,8 @@ if TYPE_CHECKING:
 
 
 Word = TypeVar("Word", bound=str)
+P = ParamSpec("P")
+R = TypeVar("R")
 
 #: Step numbers above this are no longer exact as floating-point numbers, so neither would be t = t0 + k·dt.
 LAST_STEP = 2**53
@@ -51,7 +54,23 @@ def known(argument: str, name: object, names: Iterable[Word]) -> Word:
 
     near = difflib.get_close_matches(short(name).strip("'").lower().replace(" ", "_").replace("-", "_"), names, n=1, cutoff=0.5)
     hint = f"; did you mean {near[0]!r}?" if near else "."
-    raise UnknownNameError(f"{argument}: there is no {short(name)}{hint} Known: {', '.join(names)}.")
+    raise UnknownNameError(f"{argument}: there is no {short(name)}{hint} Known: {', '.join(names) or 'none'}.")
+
+
+def with_hints(hints: Mapping[str, str]) -> Callable[[Callable[P, R]], Callable[P, R]]:
+    """Make a function say by these hints what arguments of other packages, which it does not have, are called here."""
+
+    def of(function: Callable[P, R]) -> Callable[P, R]:
+        @wraps(function)
+        def called(*args: P.args, **named: P.kwargs) -> R:
+            for name in named:
+                if name in hints:
+                    raise UnknownNameError(f"{name}: {function.__name__} has no such argument; {hints[name]}")
+            return function(*args, **named)
+
+        return called
+
+    return of
 
 
 def numbers(argument: str, value: Any, *, positive: bool = False, finite: bool = True, unit: str = "") -> Array:
@@ -74,7 +93,8 @@ def numbers(argument: str, value: Any, *, positive: bool = False, finite: bool =
     if array.dtype.kind == "O":
         array = _exact(argument, array)
     if array.dtype.kind not in "iuf":
-        raise DTypeError(f"{argument}: expected real numbers{_in(unit)}, got {_kind(value, array)}")
+        parts = f"; {COMPLEX}" if array.dtype.kind == "c" else ""
+        raise DTypeError(f"{argument}: expected real numbers{_in(unit)}, got {_kind(value, array)}{parts}")
     if array.dtype != np.float64 or not array.dtype.isnative:
         _room(argument, array.shape)
         with np.errstate(over="ignore"):  # numbers beyond the range become infinite, and are refused below
@@ -400,6 +420,9 @@ def fits_single(name: str, numbers: Array | None) -> None:
         raise ArgumentError(f"{name}: expected numbers up to 3.4e38, the largest of float32, got {large.max():g}")
 
 
+#: What to do about complex numbers.
+COMPLEX = "write the equations of real and imaginary parts: of dz/dt = −iωz with z = y[0] + 1j*y[1], [omega*y[1], -omega*y[0]]"
+
 #: What numbers of a kind are above: finite ones, those of zero or more, and those above zero.
 ANY, NOT_NEGATIVE, POSITIVE = -float("inf"), -5e-324, 0.0
 
@@ -437,10 +460,12 @@ def in_place(
     if hasattr(array, "__dlpack__") and not isinstance(array, np.ndarray):
         array = shared(argument, array)
     if not isinstance(array, np.ndarray):
-        raise DTypeError(f"{argument}: expected a NumPy array {what}, got {type(array).__name__}")
+        instead = f"; one number is np.array({array})" if isinstance(array, (int, float)) else ""
+        raise DTypeError(f"{argument}: expected a NumPy array {what}, got {type(array).__name__}{instead}")
     if array.dtype != dtype or not array.dtype.isnative:
         other = f', or dtype="{array.dtype}" as an argument' if array.dtype in (np.float32, np.float64) else ""
-        raise DTypeError(f"{argument}: expected dtype {np.dtype(dtype)} {what}, got {array.dtype}; give such an array{other}")
+        remedy = COMPLEX if array.dtype.kind == "c" else f"give such an array{other}"
+        raise DTypeError(f"{argument}: expected dtype {np.dtype(dtype)} {what}, got {array.dtype}; {remedy}")
     if array.shape != shape:
         raise ShapeError(f"{argument}: expected shape {shape}, got {array.shape}")
     if not array.flags.c_contiguous:

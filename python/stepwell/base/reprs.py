@@ -121,10 +121,10 @@ def of_member(index: tuple[int, ...]) -> str:
     return f" of {in_words(index)}" if index else ""
 
 
-def share(some: int, shape: tuple[int, ...], size: int) -> str:
-    """The phrase for some members of a batch: "2 of 3 members", "the only member"; without a batch "the run"."""
+def share(some: int, shape: tuple[int, ...], size: int, alone: str = "the run") -> str:
+    """The phrase for some members of a batch: "2 of 3 members", "the only member"; without a batch ``alone``."""
     if not shape:
-        return "the run"
+        return alone
     return "the only member" if size == 1 else f"{some} of {counted(size, 'member')}"
 
 

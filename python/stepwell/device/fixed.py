@@ -333,9 +333,11 @@ def _kernels(stages: Stages, observer: Observer | None) -> str:
     if "record" in texts or observer is not None:
         save += [f"const real q{i} = {text};" for i, text in enumerate(shown)]
     if "record" in texts:
-        # The quantities of what is saved.
-        results = texts["record"].results[slots:]
-        inner = [f"const real s{i} = q{i};" for i in range(slots)]
+        # The quantities of what is saved, and of what a controller remembers, which stands last of what is kept.
+        memory = sizes["memory"]
+        results = texts["record"].results[slots + memory :]
+        save += [f"const real q{slots + i} = s{slots + sizes['kept'] - memory + i};" for i in range(memory)]
+        inner = [f"const real s{i} = q{i};" for i in range(slots + memory)]
         save += [*(f"real r{i};" for i in range(len(results))), "{", *inner, *beside("record", "0")]
         save += [*(f"r{i} = {text};" for i, text in enumerate(results)), "}"]
         keep += [f"recorded[(at * {len(results)} + {i}) * members + g] = r{i};" for i in range(len(results))]

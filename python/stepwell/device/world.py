@@ -104,8 +104,8 @@ class World:
                 self._numbers = Numbers(self._machine, self._on_device, model, self._members, self._dt)
         return self._numbers
 
-    def step(self, n: int = 1) -> None:
-        """``n`` steps, in place."""
+    def step(self, n: int = 1) -> bool:
+        """``n`` steps, in place. Whether a number of the state is not finite then."""
         n = checks.count("n", n, 0, checks.LAST_STEP - self._step)
         self._enter()
         try:
@@ -117,6 +117,7 @@ class World:
             self._step += n
             if self._carries:
                 self._held, self._written = held, (self._v.copy(), self._y.copy())
+            return not (np.isfinite(saved_v).all() and np.isfinite(saved_y).all())
         finally:
             self._alone.release()
 

@@ -1,4 +1,4 @@
-"""The right-hand side of ``solve_ivp`` as a system: any callable ``fun(t, y, *args)``, forward or backward in time."""
+"""The right-hand side of ``solve_ivp`` as a system: any callable ``fun(t, y, *args)``."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import inspect
 from collections.abc import Callable
 from functools import partial
 from types import FunctionType, MethodType
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -14,52 +14,89 @@ from ..base import checks
 from ..errors import ArgumentError, DTypeError, TraceError
 from ..model.equations.definition import Definition
 from ..model.equations.namespace import rebound
+from ..model.equations.recognised import Unknown, identity
+from ..model.systems import System
+from ..runs.request import Request
 
 
 class RightHandSide:
-    """The function that ``stepwell.system`` runs in place of ``fun``: with its further arguments, and backward in time if asked.
+    """The function that ``stepwell.system`` runs in place of ``fun``: with its further arguments, and the shapes of SciPy."""
 
-    Args:
-        fun: a function, a method, a ``functools.partial`` or another callable.
-        args: its arguments after t and y.
-        size: length of the state.
-        vectorized: whether it expects the state as a column.
-        backward: whether the time of the system is −t, for runs from a later to an earlier time.
-    """
-
-    def __init__(self, fun: Callable[..., Any], args: tuple[Any, ...], size: int, *, vectorized: bool, backward: bool) -> None:
-        self._call, self._size, self._vectorized, self._backward = traceable(fun), size, vectorized, backward
-        self._args = args
+    def __init__(self, fun: Callable[..., Any], args: tuple[Any, ...], size: int, vectorized: bool) -> None:
+        self.reads = fun, args, size, vectorized
         function = plain_function(fun)
         self.__code__ = getattr(function, "__code__", None)  # by which an error finds its line
-        self.__name__ = self.__qualname__ = getattr(function, "__name__", type(fun).__name__)
+        self.__module__, self.__name__ = __name__, getattr(function, "__name__", type(fun).__name__)
+        self.__qualname__ = self.__name__
 
     def __call__(self, t: Any, y: Any) -> Any:
         """The rates of a state."""
-        rates = self._call(-t if self._backward else t, y[:, np.newaxis] if self._vectorized else y, *self._args)
+        fun, args, size, vectorized = self.reads
+        rates = traceable(fun)(t, y[:, np.newaxis] if vectorized else y, *args)
         shape = np.shape(rates)
-        if shape == () and self._size == 1:
-            rates = [rates]
-        elif len(shape) == 2 and shape[1] == 1:
-            rates = [row[0] for row in rates]
-        return [-each for each in rates] if self._backward else rates
-
-    def system(self) -> Any:
-        """The system of these rates.
-
-        Raises:
-            TraceError: if the function does what cannot be traced.
-        """
-        try:
-            return Definition(_named(self), 1, 1, ((0,), (self._size,)))().for_state_shapes(None, np.empty(self._size))
-        except TraceError as error:
-            raise TraceError(f"fun: {error}") from error
+        if shape == () and size == 1:
+            return [rates]
+        return [row[0] for row in rates] if len(shape) == 2 and shape[1] == 1 else rates
 
 
-def _named(rates: RightHandSide) -> Any:
-    """With what a definition reads of a function."""
-    rates.__module__ = __name__
-    return rates
+class Known(NamedTuple):
+    """The system of a function, and what was read for it.
+
+    Attributes:
+        reads: the function, its arguments, the length of the state, and whether it is a column.
+        system: its system.
+        requests: the runs that were made of it, without their starts, by what was asked for; and of calls in which equations were
+            found to be stiff, by these and the start, the run that was taken.
+    """
+
+    reads: Any
+    system: System
+    requests: dict[Any, Request]
+
+
+#: The systems of functions that are recognised, and the most that is remembered of them, and of each.
+_KNOWN: dict[Any, Known] = {}
+MOST_KNOWN = 64
+
+
+def remember(memory: dict[Any, Any], key: Any, value: Any) -> None:
+    """Keep a value for later calls."""
+    if len(memory) >= MOST_KNOWN:
+        memory.clear()
+    memory[key] = value
+
+
+def known(fun: Any, args: tuple[Any, ...], size: int, vectorized: bool) -> Known:
+    """The system of a function, traced unless that was done before of all that it reads: see ``recognised``.
+
+    Raises:
+        DTypeError: if there is no function that can be traced.
+        ArgumentError: if it does not take the arguments.
+        TraceError: if the function does what cannot be traced.
+    """
+    reads = fun, args, size, vectorized
+    try:
+        key = identity(reads)
+        found = _KNOWN.get(key)
+        # What the one of the earlier call reads may have changed since.
+        if found is not None and identity(found.reads) == key:
+            return found
+    except Unknown:
+        key = None
+    if not callable(fun):
+        raise DTypeError(f"fun: expected a function fun(t, y), got {checks.short(fun)} ({type(fun).__name__})")
+    if not isinstance(fun, type):
+        takes("fun", fun, args)
+    traceable(fun)
+    rates: Any = RightHandSide(fun, args, size, vectorized)
+    try:
+        system = Definition(rates, 1, 1, ((0,), (size,)))().for_state_shapes(None, np.empty(size))
+    except TraceError as error:
+        raise TraceError(f"fun: {error}") from error
+    found = Known(reads, system, {})
+    if key is not None:
+        remember(_KNOWN, key, found)
+    return found
 
 
 def plain_function(fun: Any) -> Any:

@@ -1,157 +1,137 @@
-"""Single adaptive steps of one trajectory, and the states between their ends, for ``solve_ivp``."""
+"""All accepted steps of one trajectory, and the states between their ends, for ``solve_ivp``."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
-from .. import _core
-from ..analysis.stiffness import HELD_DOWN, Course, stiff_members
+from ..analysis.stiffness import HELD_DOWN, Course, stiff_members, suspects
 from ..base import checks
 from ..base.arrays import Array
 from ..errors import ArgumentError, ShapeError
-from ..model.methods import Method
 from ..reference import adaptive
-from ..reference.acceptance import Acceptance
-from ..reference.adaptive import waypoints
 from ..runs import engine
+from ..runs.adaptive import paces_of
 from ..runs.diagnostics import may_be_stiff
+from ..runs.request import Request
 
 #: The most attempts at steps in one run: up to here the counts of the step-size controller are exact.
 MAX_ATTEMPTS = 2**53 - 1
-
-#: Why a run ended early, by the status of the core.
-FAILURES = {
-    adaptive.UNDERFLOW: "Required step size is less than spacing between numbers.",
-    adaptive.NOT_FINITE: "No step, however short, gives a finite state.",
-}
+#: A run that an event may end is made in pieces: the first of so many attempts, each further one of as many as all before it.
+FIRST_ATTEMPTS = 256
+#: Likewise where another method may be taken, which needs the second waypoint, that of 512 accepted steps.
+BEFORE_A_CHECK = 1024
+#: A method for stiff equations is taken if it comes as far with the attempts divided by this. One of its attempts takes about as
+#: long as one of an explicit method of like accuracy, of up to ten numbers; with more it takes up to three times as long.
+PART = 2
+#: The core has room for so many numbers of steps, and when it is filled for as many more as there are.
+NUMBERS_AT_ONCE = 1 << 18
 
 
 class Trajectory:
-    """One trajectory, advanced step by step. The time of the system grows even if the user integrates backward.
+    """One trajectory, by one call of the core, or by one for each piece. Its time is that of the plan, which always grows.
 
     Attributes:
-        times: the start and the ends of the accepted steps.
-        states: the states at these times.
-        pace: the state of the step-size controller.
-        status: the status of the core: ``adaptive.OK`` at the end, ``adaptive.BUDGET`` before it.
-        extra_steps: the number of extra steps for states between the ends of steps.
+        end: the last time.
+        times: the start and the ends of accepted steps so far, if they are kept.
+        states: the states at these times, shape (times, n).
+        saved: the states at the times that were asked for, as far as they were reached, shape (times, n).
+        status: the status of the core: ``adaptive.OK`` at the end, ``adaptive.BUDGET`` or ``engine.FULL`` before it.
     """
 
-    def __init__(self, system: Any, method: Method, span: tuple[float, float], y: Array, tolerance: tuple[Array, Array]) -> None:
-        relative, absolute = tolerance
-        of_groups = relative.ndim > 0 or absolute.ndim > 0
-        if of_groups:
-            relative, absolute = (np.broadcast_to(each, (len(y),)) for each in tolerance)
-        acceptance = Acceptance(tuple(range(len(y))), own=of_groups)
-        self._plan = engine.Plan(system, method, (), 1.0, span[0], threads=1, acceptance=acceptance)
-        self._model = engine.model(self._plan)
-        self.method, self.begin, self.end = method, *span
-        self._v = np.empty(0)
-        self.times, self.states = [span[0]], [y]
-        tolerances = engine.Tolerances(relative, absolute, of_groups)
-        pacing = engine.Pacing(np.array([span[1]]), MAX_ATTEMPTS, waypoints=not method.is_always_stable)
-        self._tolerance, self._last = float(relative.min()), y
-        self._waypoints = engine.room_for_waypoints(pacing, len(y), engine.pace_numbers(self._plan), 1)
-        self.pace: Any = engine.begun(self._plan, engine.paces(self._plan, None, tolerances, None, pacing), self._v, y)
-        self.status = adaptive.BUDGET
-        self.extra_steps = 0
+    def __init__(self, request: Request, at: Array, *, keeps: bool, attempts: int) -> None:
+        plan, control = request.plan, request.step_control
+        assert control is not None
+        self.method, self._plan, self._v, self._last, self._paces = plan.method, plan, request.v, request.y, control.paces
+        self._pacing = control.pacing._replace(
+            at=at, budget=MAX_ATTEMPTS, every=int(keeps), waypoints=not self.method.is_always_stable
+        )
+        self._attempts, self._each, self._between = attempts, engine.evaluations_of_attempt(plan), 0
+        self._waypoints: Array | None = None
+        self.end, self.status = float(at[-1]), adaptive.BUDGET
+        self.times, self.states, self.saved = np.array([plan.t0]), request.y[np.newaxis], np.empty((0, len(request.y)))
 
-    def limited(self, first_step: float | None, max_step: float) -> None:
-        """Set the first trial step and the longest step."""
-        first = self.pace.h if first_step is None else np.asarray(first_step)
-        self.pace = self.pace._replace(h=np.minimum(first, max_step), most_step=np.asarray(max_step))
+    @property
+    def goes_on(self) -> bool:
+        """Whether it has come neither to its end nor to where no step is possible."""
+        return self.status in (adaptive.BUDGET, engine.FULL)
+
+    @property
+    def reached(self) -> float:
+        """The time that it has reached."""
+        return self.end if self.status == adaptive.OK else float(self._paces[engine.TIME])
 
     @property
     def evaluations(self) -> int:
         """Function evaluations so far."""
-        attempts = self.pace.accepted + self.pace.rejected + self.pace.extra_steps
-        return self.method.attempt_evaluations * (int(attempts) + self.extra_steps)
+        return int(paces_of(self._plan, self._paces, self._each).evaluations) + self._each * self._between
 
     def advance(self) -> bool:
-        """Make one accepted step, by as many attempts as it takes. Return whether there was one."""
-        while self.status == adaptive.BUDGET:
-            accepted = float(self.pace.accepted)
-            attempts = int(accepted + self.pace.rejected) + 1
-            saved, last = self._continued(self.pace, self.states[-1], np.array([self.end]), attempts)
-            self._last = last
-            if self._waypoints is not None and waypoints.is_near(int(self.pace.accepted)):
-                waypoints.keep(self._waypoints, accepted, self.pace, self._v, last)
-            if self.status == adaptive.OK:
-                self.times.append(self.end)
-                self.states.append(saved[0])
-                return True
-            if self.pace.accepted > accepted:
-                self.times.append(float(self.pace.t))
-                self.states.append(last)
-                return True
-        return False
+        """Make the steps of the next piece. Return whether there was one."""
+        if not self.goes_on:
+            return False
+        room = 1 + min(max(NUMBERS_AT_ONCE // (1 + len(self._last)), len(self.times)), self._attempts)  # one is never filled
+        pacing = self._pacing._replace(at=self._pacing.at[len(self.saved) :], budget=self._attempts, room=room)
+        out = engine.adapt(self._plan, pacing, self._paces, self._v, self._last)
+        self._paces, self._last, self._waypoints, self.status = out.paces, out.last_y, out.waypoints, int(out.status)
+        self._pacing = self._pacing._replace(begins=False, waypoints=False if out.waypoints is None else out.waypoints)
+        is_done = self.status == adaptive.OK
+        if self.status == adaptive.BUDGET:
+            self._attempts = min(2 * self._attempts, MAX_ATTEMPTS)
+        self.saved = np.concatenate([self.saved, out.y[: None if is_done else np.isfinite(out.y[:, 0]).sum()]])
+        if out.steps is not None:
+            # A step may pass the end, whose state is another one.
+            count = int(np.searchsorted(out.steps.t[: out.steps.counts[0], 0], self.end))
+            ends, states = [self.times, out.steps.t[:count, 0]], [self.states, out.steps.y[:count, :, 0]]
+            self.times = np.concatenate([*ends, pacing.at[-1:]] if is_done else ends)
+            self.states = np.concatenate([*states, out.y[-1:]] if is_done else states)
+        return True
 
-    def advance_to_the_end(self, times: Array) -> Array:
-        """Continue to the end; return the states at these ascending times, up to the last one reached."""
-        saved, self._last = self._continued(self.pace, self.states[-1], times, MAX_ATTEMPTS, self._waypoints)
-        return saved[: len(times) if self.status == adaptive.OK else int((times <= float(self.pace.t)).sum())]
-
-    def state(self, t: float) -> Array:
-        """The state at one time."""
-        state: Array = self.at(np.array([t]))[:, 0]
-        return state
+    def end_at(self, time: float) -> None:
+        """Take back what is after this time."""
+        kept = self.times < time
+        last = self.at(np.array([time])).T
+        self.times, self.states = np.append(self.times[kept], time), np.concatenate([self.states[kept], last])
 
     def at(self, times: Array) -> Array:
-        """The states at times from the start to the end of the steps so far, shape (n, times).
+        """The states at times from the start to the end of the steps so far, shape (n, times), by one call of the core.
 
-        Each is computed by a step of the method from the end of a step before it, so its error is that of a shorter step.
+        Each is computed by a step of the method from the end of the step before it, so its error is that of a shorter step.
         """
-        states = np.empty((len(self.states[0]), len(times)))
         if not len(times):
-            return states
-        ends = np.array(self.times)
-        steps = np.clip(np.searchsorted(ends, times, side="right") - 1, 0, len(ends) - 1)
-        on_end = ends[steps] == times
-        for k in np.flatnonzero(on_end):
-            states[:, k] = self.states[steps[k]]
-        for i in np.unique(steps[~on_end]):
-            within = np.flatnonzero((steps == i) & ~on_end)
-            targets, places = np.unique(times[within], return_inverse=True)
-            states[:, within] = self._within(int(i), targets).T[:, places.reshape(-1)]
+            return np.empty((len(self._last), 0))
+        steps = np.searchsorted(self.times, times, side="right") - 1
+        since, pacing = self.times[steps], self._pacing._replace(at=times[np.newaxis], every=0, waypoints=False)
+        if (jumps := engine.jumps_of(self._plan, pacing)) is not None:
+            since = np.maximum(since, np.append(-np.inf, jumps.after)[jumps.passed(since)])
+        self._between += int((since < times).sum())
+        paces = np.repeat(self._paces[:, np.newaxis], len(times), axis=1)
+        # A step that goes beyond the time is held, and only the extra step to there is made.
+        paces[engine.TIME], paces[engine.STEP], paces[engine.HELD], paces[engine.EXTRA] = since, 2.0 * (times - since), 1.0, 0.0
+        start = np.empty((0, len(times))), np.ascontiguousarray(self.states[steps].T)
+        states: Array = engine.adapt(self._plan._replace(batch=times.shape), pacing, paces, *start).y[0]
         return states
 
-    def _within(self, i: int, times: Array) -> Array:
-        """The states at ascending times within a step, by extra steps from its start."""
-        longer = 2.0 * (times[-1] - self.times[i])
-        pace = self.pace._replace(t=self.times[i], h=longer, held=1.0, extra=0.0)
-        before = self.pace, self.status
-        saved, _ = self._continued(pace, self.states[i], times, MAX_ATTEMPTS)
-        self.pace, self.status = before
-        self.extra_steps += len(times)
-        return saved
+    def loses_to(self, requested: Callable[[], Request]) -> bool:
+        """Whether another method would have come as far with a part of the attempts: see ``PART``."""
+        attempts = int(self._paces[engine.COUNTS][:2].sum()) // PART
+        if self.status != adaptive.BUDGET or PART * attempts < BEFORE_A_CHECK or self._waypoints is None:
+            return False
+        if not suspects(self._plan, self._waypoints) or self.reached - self._plan.t0 > attempts * self._paces[engine.MOST_STEP]:
+            return False  # so many steps, however long, do not come as far
+        other = Trajectory(requested(), self._pacing.at[-1:], keeps=False, attempts=attempts)
+        return other.advance() and other.reached >= self.reached
 
-    def stiffness(self, way: float) -> str:
-        """That stability held down the steps, and what to do, in words; "" if it did not. ``way`` is −1 where time runs back."""
-        if self._waypoints is None or not may_be_stiff(int(self.pace.accepted), len(self.states[0])):
+    def stiffness(self) -> str:
+        """That stability held down many steps, and what to do, in words; "" if it did not."""
+        if self._waypoints is None or not may_be_stiff(int(self._paces[engine.COUNTS.start]), len(self._last)):
             return ""
-        status = np.asarray(adaptive.OK if self.status == adaptive.BUDGET else self.status)  # an event may have ended it
-        course = Course(self._plan, self._tolerance, None, status, engine.numbers_of(self.pace), self._v, self._last, way)
-        stiff = stiff_members(course, self._waypoints)
+        plan, paces, status = self._plan, self._paces, np.asarray(adaptive.OK if self.goes_on else self.status)
+        tolerance, walls, way = float(paces[engine.RELATIVE]), self._pacing.jumps, -1.0 if plan.backward else 1.0
+        stiff = stiff_members(Course(plan, tolerance, walls, status, paces, self._v, self._last, way), self._waypoints)
         return "" if stiff is None else f"{HELD_DOWN} the run: {stiff.why}"
-
-    def _continued(self, pace: Any, y: Array, times: Array, attempts: int, passed: Array | None = None) -> tuple[Array, Array]:
-        """Continue from a state of the controller and a state; return the states at these times, and the last state.
-
-        ``passed`` gets where the trajectory stands on the way.
-        """
-        n = len(y)
-        saved_v, saved_y = np.empty((len(times), 0)), np.empty((len(times), n))
-        last, status = np.empty((n, 1)), np.empty(1, dtype=np.int64)
-        paces = engine.numbers_of(pace).reshape(-1, 1)
-        last_paces = np.empty_like(paces)
-        arrays = engine.AdaptiveArrays(
-            np.empty((0, 1)), y.reshape(n, 1), paces, saved_v, saved_y, last, last_paces, status, None, None, passed
-        )
-        _core.adapt(self._model, self._plan, engine.pacing_of_core(self._plan, engine.Pacing(times, attempts)), arrays)
-        self.pace, self.status = engine.pace_of(self._plan, last_paces.reshape(-1)), int(status[0])
-        return saved_y, last.reshape(n)
 
 
 class Solution:

@@ -214,14 +214,16 @@ class Reader:
                     self._check(one.definition.name, digest(one), part["operations"])
                 if "controller" in part:
                     controller = one.controller
-                    self._check(controller.definition.name, controller.digest(one), part["controller"])
+                    self._check(controller.name, controller.digest(one), part["controller"])
                 return one
 
     def _definition(self, module: str, name: str, *, of_controller: bool = False) -> Definition | ControllerDefinition:
         """The definition of ``system``, or else the one of that name in a module that is imported already."""
         if of_controller and isinstance(self.system, System) and self.system.controller is not None:
-            known: ControllerDefinition = self.system.controller.definition
-            return known
+            known: dict[str, ControllerDefinition] = {
+                of.name: of for of in (each.definition for each in self.system.controller.each)
+            }
+            return known.get(name.rpartition(".")[2]) or next(iter(known.values()))
         if isinstance(self.system, Definition) and not of_controller:
             return self.system
         if isinstance(self.system, OwnSystem) and not of_controller:

@@ -12,15 +12,24 @@ from ..base import checks
 from ..base.arrays import Array
 from ..errors import ArgumentError, DTypeError, ShapeError, StiffnessWarning, ToleranceWarning
 from ..model.equations.definition import Definition
+from ..model.methods import Method
 from ..reference import adaptive
 from ..runs.findings import is_heard
+from ..runs.options import Options
+from ..runs.request import Request
 from .ivp_events import Event, note_zeros
-from .ivp_function import RightHandSide, arguments, takes
+from .ivp_function import arguments, known, remember
 from .ivp_methods import chosen
-from .ivp_steps import FAILURES, Solution, Trajectory
+from .ivp_steps import BEFORE_A_CHECK, FIRST_ATTEMPTS, MAX_ATTEMPTS, Solution, Trajectory
 
 #: The smallest relative tolerance; smaller ones are raised to it, since rounding errors of a step are not much smaller.
 LEAST_RELATIVE = 100.0 * np.finfo(float).eps
+
+#: Why a run ended early, by the status of the core.
+FAILURES = {
+    adaptive.UNDERFLOW: "Required step size is less than spacing between numbers.",
+    adaptive.NOT_FINITE: "No step, however short, gives a finite state.",
+}
 
 #: SciPy's messages for a run that reached its end, or an event that ends it.
 ENDS = {0: "The solver successfully reached the end of the integration interval.", 1: "A termination event occurred."}
@@ -89,10 +98,11 @@ def solve_ivp(
 ) -> OdeResult:
     """Solve ẏ = fun(t, y) from a state, with the arguments of SciPy's ``solve_ivp``, so that changing an import tries stepwell.
 
-    ``fun`` is run with symbols at the start, not at every step. An operation that cannot be traced (``if`` on a state,
-    ``np.random``) is an error that names the line. Results have the same bits on every machine.
+    ``fun`` is run with symbols at the start, not at every step, and not again by later calls if all that it reads is the same. An
+    operation that cannot be traced (``if`` on a state, ``np.random``) is an error that names the line. Results have the same bits
+    on every machine.
 
-    Differences from SciPy: there is no RK45, and the default method is ``"dop853"``. A step is judged by the component with the
+    Differences from SciPy: the default method is ``"dop853"``. A step is judged by the component with the
     largest error relative to its tolerance, not by the root mean square over all. ``sol`` and events use short steps of the
     method in place of interpolation. The state is real. For many trajectories, use ``stepwell.system`` and ``integrate``.
 
@@ -100,9 +110,10 @@ def solve_ivp(
         fun: ``fun(t, y, *args)``, which returns ẏ: a function, a method or another callable that is written in Python.
         t_span: the times (t0, tf) of start and end; tf may be earlier than t0.
         y0: the state at t0, shape (n,).
-        method: the name of a method with an ``error_order``: "dop853", "fehlberg", "fehlberg_5", "merson", and for stiff
-            equations "rosenbrock23", "rodas4", "rodas5p", by any of their names; None for "dop853". For "Radau" it is "rodas5p",
-            and for "BDF" and "LSODA" "rodas4", with a warning.
+        method: the name of a method with an ``error_order``: "dop853", "dopri5" ("RK45"), "bs32" ("RK23") and others, and for
+            stiff equations "rosenbrock23", "rodas4", "rodas5p", by any of their names; None for "dop853". With a warning, "Radau"
+            and "BDF" are the one for the tolerance, and "LSODA" is "dop853", or that one if it comes as far in half of the
+            attempts.
         t_eval: the times at which to return the state, in the direction of the run; None for the ends of the steps. Steps do not
             depend on them.
         dense_output: whether to return ``sol``, which gives the state at any time.
@@ -150,65 +161,87 @@ def solve_ivp(
         >>> result.success, result.message
         (True, 'The solver successfully reached the end of the integration interval.')
     """
-    solver = chosen(method)
     begin, end = _span(t_span)
     state = _start(y0)
     sign = -1.0 if end < begin else 1.0
     times = None if t_eval is None else _times(t_eval, begin, end, sign)
     dense_output = checks.flag("dense_output", dense_output)
     args = arguments(args)
-    noted = None if events is None else [Event(each, args) for each in (events if _is_several(events) else [events])]
+    functions = [] if events is None else [events] if callable(events) else checks.several("events", events, "functions")
     _warn_of_useless(jac=jac, jac_sparsity=jac_sparsity, lband=lband, uband=uband, min_step=min_step or None)
-    if not callable(fun):
-        raise DTypeError(f"fun: expected a function fun(t, y), got {checks.short(fun)} ({type(fun).__name__})")
     if isinstance(fun, Definition):
         if fun.has_v:
             raise DTypeError(f"fun: expected a function fun(t, y), got the system {fun.name} of second order; use integrate")
         fun = fun.function
-    if not isinstance(fun, type):
-        takes("fun", fun, args)
-    right = RightHandSide(fun, args, len(state), vectorized=checks.flag("vectorized", vectorized), backward=sign < 0.0)
-    trajectory = Trajectory(right.system(), solver, (sign * begin, sign * end), state, _tolerances(rtol, atol, len(state)))
-    trajectory.limited(
-        None if first_step is None else _first(first_step, abs(end - begin)),
-        _longest(max_step),
-    )
-    if times is not None and noted is None and not dense_output and end != begin:
-        wanted = sign * times
-        output = wanted if len(wanted) and wanted[-1] == trajectory.end else np.append(wanted, trajectory.end)
-        states = trajectory.advance_to_the_end(output)[: len(times)].T
-        _warn_of_stiffness(trajectory, sign)
-        return _result(trajectory, None, times[: states.shape[1]], np.ascontiguousarray(states), None, None)
+    of_function = known(fun, args, len(state), checks.flag("vectorized", vectorized))
+    relative, absolute = _tolerances(rtol, atol, len(state))
+    is_bound = not (isinstance(max_step, float) and max_step == np.inf)
+    longest = checks.number("max_step", max_step, positive=True, unit="units of time") if is_bound else None
+    first = None if first_step is None else _first(first_step, abs(end - begin), longest)
+    solver, stiff = chosen(method, float(relative.min()))
+    at = np.array([sign * end])
+    if times is not None and not functions:
+        at = sign * (times if len(times) and times[-1] == end else np.append(times, end))
 
-    ended = _advanced(trajectory, noted, sign) if end != begin else None
-    _warn_of_stiffness(trajectory, sign)
-    ts = sign * np.array(trajectory.times)
-    if end == begin:
-        ts, trajectory.status = np.array([begin]), adaptive.OK
+    asked = begin, end, first, longest, relative.tobytes(), absolute.tobytes()
+    start = (*asked, state.tobytes())
+
+    def requested(solver: Method) -> Request:
+        """The run by a method, which is known but for its start if another call asked for it."""
+        key = id(solver), *asked  # own methods may have the same name
+        request = of_function.requests.get(key)
+        if request is None:
+            options = Options(
+                y=state, tolerance=(relative, absolute), at=end, t0=begin, dt=None if first is None else sign * first,
+                max_step=longest, threads=1, device="cpu",
+            )  # fmt: skip
+            request = Request.of(of_function.system, solver, options)
+            remember(of_function.requests, key, request)
+        return request._replace(y=state)
+
+    def made(solver: Method, instead: Method | None) -> tuple[Trajectory, list[Event], float | None]:
+        """The trajectory by a method, or by another one if equations are stiff."""
+        request, noted = requested(solver), [Event(each, args) for each in functions]
+        if instead is not None and not noted:  # an event may end the run before that is noticed
+            request = of_function.requests.get(start, request)
+        attempts = FIRST_ATTEMPTS if functions else MAX_ATTEMPTS if instead is None else BEFORE_A_CHECK
+        trajectory = Trajectory(request, at, keeps=times is None or dense_output or bool(functions), attempts=attempts)
+        values = [len(noted) * [np.nan], [each.value(begin, state) for each in noted]]
+        while end != begin and trajectory.advance():
+            if instead is not None and trajectory.loses_to(lambda: requested(instead)):
+                remember(of_function.requests, start, requested(instead))
+                return made(instead, None)
+            if noted and (ended := _ended(trajectory, noted, values, sign)) is not None:
+                trajectory.end_at(sign * ended)
+                return trajectory, noted, ended
+        return trajectory, noted, None
+
+    trajectory, noted, ended = made(solver, stiff)
+    if stiff is None and is_heard(StiffnessWarning) and (text := trajectory.stiffness()):
+        warnings.warn(text, StiffnessWarning, stacklevel=2)
+    ts = sign * trajectory.times
     if times is None:
-        saved, states = ts, np.array(trajectory.states).T.copy()
-    else:
+        saved, states = ts, trajectory.states.T.copy()
+    elif functions or end == begin:
         saved = times[sign * times <= trajectory.times[-1]]
         states = trajectory.at(sign * saved)
+    else:
+        saved = times[: len(trajectory.saved)]
+        states = np.ascontiguousarray(trajectory.saved[: len(times)].T)
     sol = Solution(trajectory, ts, sign) if dense_output else None
-    return _result(trajectory, ended, saved, states, sol, noted)
+    return _result(trajectory, ended, saved, states, sol, None if events is None else noted)
 
 
-def _advanced(trajectory: Trajectory, events: list[Event] | None, sign: float) -> float | None:
-    """Make all steps and record the zeros of events; returns the time at which an event ended the run, or None."""
-    events = events or []
-    before = [float("nan") for _ in events]
-    values = [event.value(sign * trajectory.times[0], trajectory.states[0]) for event in events]
-    while trajectory.advance():
-        if not events:
-            continue
-        span = sign * trajectory.times[-2], sign * trajectory.times[-1]
-        after = [event.value(span[1], trajectory.states[-1]) for event in events]
-        ended = note_zeros(events, [before, values, after], lambda t: trajectory.state(sign * t), span)
-        before, values = values, after
+def _ended(trajectory: Trajectory, events: list[Event], values: list[list[float]], sign: float) -> float | None:
+    """Record the zeros of events in the steps that were added; return the time at which one of them ends the run, or None.
+
+    ``values`` are those of the events at the times so far, the first before the start.
+    """
+    for k in range(len(values) - 1, len(trajectory.times)):
+        span = sign * trajectory.times[k - 1], sign * trajectory.times[k]
+        values.append([event.value(span[1], trajectory.states[k]) for event in events])
+        ended = note_zeros(events, values[-3:], lambda t: trajectory.at(np.array([sign * t]))[:, 0], span)
         if ended is not None:
-            last = trajectory.state(sign * ended)
-            trajectory.times[-1], trajectory.states[-1] = sign * ended, last
             return ended
     return None
 
@@ -217,7 +250,7 @@ def _result(
     trajectory: Trajectory, ended: float | None, t: Array, y: Array, sol: Solution | None, events: list[Event] | None
 ) -> OdeResult:
     """The result, with SciPy's names."""
-    status = 1 if ended is not None else 0 if trajectory.status == adaptive.OK else -1
+    status = 1 if ended is not None else -1 if trajectory.status in FAILURES else 0
     n = len(trajectory.states[0])
     solver = trajectory.method
     jacobians = trajectory.evaluations // solver.attempt_evaluations if solver.is_implicit else 0  # one for each attempt
@@ -246,10 +279,6 @@ def _span(t_span: Any) -> tuple[float, float]:
 
 
 def _start(y0: Any) -> Array:
-    if checks.as_array("y0", y0).dtype.kind == "c":
-        raise DTypeError(
-            "y0: expected real numbers, got complex ones; write the equations of real and imaginary parts: y = [Re, Im]"
-        )
     state = checks.numbers("y0", y0)
     if state.ndim != 1 or not state.size:
         raise ShapeError(f"y0: expected a state of shape (n,), got shape {state.shape}")
@@ -269,17 +298,11 @@ def _times(t_eval: Any, begin: float, end: float, sign: float) -> Array:
     return times
 
 
-def _first(first_step: Any, whole: float) -> float:
+def _first(first_step: Any, whole: float, longest: float | None) -> float:
     first = checks.number("first_step", first_step, positive=True, unit="units of time")
     if first > whole:
         raise ArgumentError(f"first_step: expected at most the whole time, {whole:g}, got {first:g}")
-    return first
-
-
-def _longest(max_step: Any) -> float:
-    if isinstance(max_step, float) and max_step == np.inf:
-        return np.inf
-    return checks.number("max_step", max_step, positive=True, unit="units of time")
+    return first if longest is None else min(first, longest)
 
 
 def _tolerances(rtol: Any, atol: Any, n: int) -> tuple[Array, Array]:
@@ -295,16 +318,6 @@ def _tolerances(rtol: Any, atol: Any, n: int) -> tuple[Array, Array]:
             f"rtol: {least:g} is too small for numbers of 53 bits, so it is {LEAST_RELATIVE:.3g}", ToleranceWarning, stacklevel=3
         )
     return np.maximum(relative, LEAST_RELATIVE), absolute
-
-
-def _is_several(events: Any) -> bool:
-    return not callable(events) and bool(checks.several("events", events, "functions") or True)
-
-
-def _warn_of_stiffness(trajectory: Trajectory, sign: float) -> None:
-    """Warn if stability held down the steps, and not the tolerance."""
-    if is_heard(StiffnessWarning) and (text := trajectory.stiffness(sign)):
-        warnings.warn(text, StiffnessWarning, stacklevel=3)
 
 
 def _warn_of_useless(**arguments: Any) -> None:

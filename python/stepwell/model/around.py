@@ -41,6 +41,10 @@ class Part(Immutable, ValueEquality, ABC):
         """Raise if it does not work with a system."""
         return
 
+    def beside(self, other: Any) -> Part:
+        """What is around a system with this part that had another of its kind, or None: this part alone."""
+        return self
+
     @property
     def batch(self) -> Shape:
         """The shape to which its numbers broadcast."""

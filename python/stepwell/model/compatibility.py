@@ -7,11 +7,15 @@ from typing import Any
 
 import numpy as np
 
+from ..base.immutable import changed
 from ..errors import ArgumentError, UnsupportedError
 from .controls import Control, EnergyControl, NormControl
 from .methods import Method
-from .systems import Sampled, System
+from .systems import Sampled, Springs, System
 from .systems.rods import RodSystem
+
+#: Terms that depend on the velocity, and may turn it instead of slowing it.
+TURNING = ("forces that do", "velocities in the rows of v", "the Coriolis force")
 
 
 def fits_together(system: System, method: Method) -> None:
@@ -34,9 +38,11 @@ def fits_together(system: System, method: Method) -> None:
     if not system.second_order:
         raise UnsupportedError(f"{method.name} needs a second-order system, ÿ = a(t, y); {system!r} is not one")
     if (term := system.uncontrolled.velocity_term) is not None:
+        # What turns the velocity, as a magnetic field does, makes false_euler grow at every step; what slows it does not.
+        instead = "use rk4, or implicit_midpoint, which keeps what turns" if term in TURNING else "use false_euler"
         raise UnsupportedError(
             f"{method.name} needs forces that do not depend on the velocity, but {system!r} has {term}; "
-            f"use false_euler{'' if term == 'forces that do' else f', or leave {term} out'}"
+            f"{instead}{'' if term == 'forces that do' else f', or leave {term} out'}"
         )
     if system.keeper is not None and method.carry is not None:
         raise UnsupportedError(
@@ -61,7 +67,16 @@ def _has_exact_steps(system: System) -> None:
 
 
 def samples_meet_steps(system: System, method: Method, t0: Any, dt: float) -> None:
-    """Raise if a sample of an input of the exact method begins within a step, which then has no one matrix."""
+    """Raise if a sample of an input of the exact method begins within a step, which then has no one matrix.
+
+    Nor does a series of fixed steps see a piece of the rates that the time chooses within a step.
+    """
+    if method.has_series and system.switches_by_time:
+        raise UnsupportedError(
+            f"dt: {system!r} compares the time, or rounds it, and a series takes what holds at the start of a step for all of "
+            f"it, so a pulse within a step is lost; give tolerance= and at= with another method, such as dop853, whose steps end "
+            f"where the time switches"
+        )
     if not method.is_exact:
         return
     for name, each in system.given_inputs().items():
@@ -153,6 +168,23 @@ def fits_own_times(system: System, single: bool) -> None:
     if single and system.has_time:
         raise UnsupportedError(
             "t0: an array works with float64 only, since in float32 t0 + k·dt would be rounded twice; make a run for each t0"
+        )
+
+
+def bounces_within_limits(system: System, method: Method, dt: float) -> None:
+    """Raise if an implicit step is so long that what a bounce does to a net of springs adds energy.
+
+    The step is solved for without the bounce, which then moves one end of a spring alone: with h²k above the mass that stretches
+    the spring by more than the impact had in energy.
+    """
+    if not (method.is_implicit and isinstance(system, Springs) and any(surface.way != "spring" for surface in system.contacts)):
+        return
+    undamped = changed(system, damping=None, drag=None, velocity_term=None)  # damping only takes energy
+    if abs(dt) > (longest := float(np.min(undamped.safe_step("false_euler")))):
+        raise UnsupportedError(
+            f"dt: expected at most {longest:.3g}, got {abs(dt):.3g}: {method.name} solves for the springs without the surfaces, "
+            f"and a bounce after a longer step adds energy. Make several shorter steps a frame, which false_euler makes faster, "
+            f'or take Floor(way="spring", omega=…), whose push linearly_implicit_euler solves for together with the springs'
         )
 
 

@@ -1,14 +1,18 @@
-"""``stepwell.controller``: a user's function becomes a sampled controller, a part around a system."""
+"""``stepwell.controller``: a user's function becomes a sampled controller, a part around a system.
+
+Several around one system are one part: ``Controllers``, whose state is all that each of them remembers.
+"""
 
 from __future__ import annotations
 
 import hashlib
 import inspect
+import re
 from collections.abc import Callable
 from itertools import count
-from math import ceil, prod
+from math import ceil, gcd, lcm, prod
 from types import FunctionType
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
 import numpy as np
 
@@ -57,12 +61,14 @@ class Target(NamedTuple):
     """A parameter of a system that a controller sets.
 
     Attributes:
+        name: its name among the arguments of the system.
         key: its name among the parameters of the system's equations.
         place: its place, if it stands in a list of inputs under that name.
         row: the name of its rows in the core.
         shape: the shape of its numbers for a member.
     """
 
+    name: str
     key: str
     place: int | None
     row: str
@@ -93,7 +99,7 @@ class ControllerDefinition:
 
     Attributes:
         function: the function.
-        has_v: whether it takes v.
+        reads: what it takes beside the time: v and y, y, or the outputs z.
         memory: names and initial values of its state.
         parameters: names and defaults of its parameters.
     """
@@ -103,7 +109,7 @@ class ControllerDefinition:
         self.__name__ = self.name = function.__name__
         self.__doc__, self.__module__, self.__qualname__ = function.__doc__, function.__module__, function.__qualname__
         self.__wrapped__ = function
-        self.has_v, self.memory, self.parameters = _arguments(function)
+        self.reads, self.memory, self.parameters = _arguments(function)
 
     def __call__(self, /, *, sets: Any = "u", period: Any, delay: Any = 0.0, **values: Any) -> Controller:
         """The controller with these parameters; the others have their defaults.
@@ -144,15 +150,18 @@ class ControllerDefinition:
         return reduced(self, "a controller")
 
 
-def _arguments(function: FunctionType) -> tuple[bool, dict[str, Any], dict[str, Any]]:
-    """Whether a function takes v, and names and defaults of its state and of its parameters."""
-    arguments = list(inspect.signature(function).parameters.values())
+def _arguments(function: FunctionType) -> tuple[tuple[str, ...], dict[str, Any], dict[str, Any]]:
+    """What a function takes beside the time, and names and defaults of its state and of its parameters."""
+    signature = inspect.signature(function)
+    arguments = list(signature.parameters.values())
     names = [each.name for each in arguments]
-    has_v = names[:3] == ["t", "v", "y"]
-    head = 3 if has_v else 2
-    expected = "(t, v, y, …) or (t, y, …), then its state and, behind *, its parameters, both with defaults"
-    got = f"{function.__name__}: expected a function {expected}, got ({', '.join(map(str, arguments))})"
-    if names[:head] != ["t", "v", "y"][-head:] and names[:head] != ["t", "y"]:
+    head = 3 if names[:3] == ["t", "v", "y"] else 2
+    expected = (
+        "(t, v, y, …) or (t, y, …), or (t, z, …) of the outputs, then its state and, behind *, its parameters, both with defaults"
+    )
+    named = f": the state is called y here, got {names[1]}" if names[1:2] and names[0] == "t" and names[1] not in "vyz" else ""
+    got = f"{function.__name__}: expected a function {expected}, got {signature}{named}"
+    if names[:head] not in (["t", "v", "y"], ["t", "y"], ["t", "z"]):
         raise ArgumentError(got)
     memory: dict[str, Any] = {}
     parameters: dict[str, Any] = {}
@@ -167,7 +176,7 @@ def _arguments(function: FunctionType) -> tuple[bool, dict[str, Any], dict[str, 
         numbers = checks.numbers(f"{function.__name__}: default of {each.name}", each.default)
         kind = parameters if each.kind is each.KEYWORD_ONLY else memory
         kind[each.name] = frozen(each.name, numbers) if numbers.ndim else each.default
-    return has_v, memory, parameters
+    return tuple(names[1:head]), memory, parameters
 
 
 def controller(function: Callable[..., Any], /) -> ControllerDefinition:
@@ -178,9 +187,10 @@ def controller(function: Callable[..., Any], /) -> ControllerDefinition:
     symbols in place of numbers, as that of ``stepwell.system``; write it for one member.
 
     Args:
-        function: ``f(t, v, y, state=0.0, *, parameter=1.0)``, for a system without velocities ``f(t, y, …)``. It returns what it
-            sets, and behind that the next values of its state, if it has one: ``u`` or ``(u, state)``. The defaults of its state
-            are the values at the start. Defaults that are arrays have axes of their own.
+        function: ``f(t, v, y, state=0.0, *, parameter=1.0)``, for a system without velocities ``f(t, y, …)``; ``f(t, z, …)``
+            takes the outputs C·s of a linear system in place of its states, shape (outputs,). It returns what it sets, and behind
+            that the next values of its state, if it has one: ``u`` or ``(u, state)``. The defaults of its state are the values at
+            the start. Defaults that are arrays have axes of their own.
 
     Returns:
         A ``ControllerDefinition``: called with ``sets``, ``period``, ``delay`` and parameters by name, it returns a
@@ -241,9 +251,34 @@ class Controller(Part):
                 raise ShapeError(f"{name}: {each}: expected {own} axes of its own, like its default, got shape {numbers.shape}")
         return checked
 
+    def _value(self, name: str) -> Array:
+        """The numbers of a parameter."""
+        numbers: Array = self.values[name]
+        return numbers
+
     def _own(self, name: str) -> int:
         """How many axes of its own a value has: as many as its default."""
         return np.ndim((self.definition.memory | self.definition.parameters)[name])
+
+    @property
+    def each(self) -> tuple[Controller, ...]:
+        """The controllers of which it is made: itself."""
+        return (self,)
+
+    @property
+    def name(self) -> str:
+        """The name of its function."""
+        return self.definition.name
+
+    @property
+    def reads_outputs(self) -> bool:
+        """Whether one of them takes the outputs of a linear system."""
+        return any(each.definition.reads == ("z",) for each in self.each)
+
+    @property
+    def tunable(self) -> dict[str, tuple[Controller, str]]:
+        """Its parameters by name: whose they are, and what they are called there."""
+        return {name: (self, name) for name in self.definition.parameters}
 
     @property
     def batch(self) -> Shape:
@@ -258,28 +293,40 @@ class Controller(Part):
         late = f", delay={self.delay:g}" if self.delay else ""
         return f"{self.definition.name}(sets={', '.join(self.sets)}, period={self.period:g}{late})"
 
+    def beside(self, other: Controller | None) -> Controller:
+        """This controller together with one that is around the system already."""
+        return self if other is None else Controllers((*other.each, self))
+
     def check(self, system: System) -> None:
-        """Raise if there is nothing of these names that it could set, or the state is of another kind."""
+        """Raise if it could set nothing of these names, one does so already, or it reads what the system does not have."""
+        other = system.controller
+        if other is not None and (twice := [name for name in self.sets if name in other.sets]):
+            raise UnsupportedError(
+                f"part: the system has the controller {other!r} already, which sets {', '.join(twice)} as well; two controllers "
+                f"set different parameters"
+            )
         for name in self.sets:
             target(system, name)
-        if twice := [name for name in self.definition.parameters if name in system.arguments()]:
+        whole = self.beside(other)
+        if twice := [name for name in whole.tunable if name in system.arguments()]:
             raise ArgumentError(
                 f"part: expected parameters of the controller by other names than those of the system, since a world sets both "
                 f"by name, got {', '.join(twice)}"
             )
-        definition = getattr(system, "definition", None)
+        if len(whole.tunable) < sum(len(each.tunable) for each in whole.each):
+            raise ArgumentError(f"part: expected parameters of {whole!r} that differ by name, got {', '.join(whole.tunable)}")
+        definition, reads = getattr(system, "definition", None), self.definition.reads
+        if reads == ("z",):
+            _output_rows(system)
+            return
         has_v = system.v_shape != (0,) if definition is None else definition.has_v
-        if has_v is not self.definition.has_v:
+        if has_v is not (len(reads) == 2):
             expected = "(t, v, y, …)" if has_v else "(t, y, …), since the system has no velocities"
-            raise ArgumentError(
-                f"part: expected a controller of {expected}, got {self.definition.name} of "
-                f"{'(t, v, y, …)' if self.definition.has_v else '(t, y, …)'}"
-            )
+            raise ArgumentError(f"part: expected a controller of {expected}, got {self.name} of (t, {', '.join(reads)}, …)")
 
     def parameters(self, y_shape: Shape, batch: Shape) -> dict[str, Any]:
         """Its parameters, and its timing once that is known."""
-        own = self.definition.parameters
-        values = {f"controller.{name}": aligned(self.values[name], self._own(name), batch) for name in own}
+        values = {f"controller.{name}": aligned(self._value(name), self._own(name), batch) for name in self.tunable}
         return values if self.timing is None else values | self._in_steps()
 
     def own_axes(self, name: str) -> int:
@@ -291,7 +338,7 @@ class Controller(Part):
         """This controller with other numbers for some parameters."""
         return changed(self, values=FixedDict(self._checked(dict(self.values) | values)))
 
-    def member(self, one: Callable[..., Array]) -> Controller:
+    def member(self, one: Callable[..., Array]) -> Self:
         """The controller for one member of a batch."""
         return changed(self, values=FixedDict({name: one(value, self._own(name)) for name, value in self.values.items()}))
 
@@ -299,7 +346,7 @@ class Controller(Part):
         """The system: what the controller sets is set before the system is made."""
         return s
 
-    def over_steps(self, dt: float, *, single: bool = False) -> Controller:
+    def over_steps(self, dt: float) -> Controller:
         """This controller with its period and its delay in steps of this length.
 
         Raises:
@@ -315,14 +362,30 @@ class Controller(Part):
 
     # ---- in steps
 
+    @property
+    def loop_key(self) -> tuple[Any, ...]:
+        """What is the same of controllers that remember the same."""
+        return tuple((each.definition, each.sets, each.timing) for each in self.each)
+
+    @property
+    def cycle(self) -> int:
+        """After so many steps samples are where they were."""
+        return self._timing().steps
+
+    def counters(self, system: System) -> list[int]:
+        """Where among what it remembers steps are counted."""
+        return [0]
+
     def targets(self, system: System) -> list[Target]:
         """What it sets."""
         return [target(system, name) for name in self.sets]
 
     def _counts(self, system: System) -> tuple[int, int]:
         """How many numbers it sets, and how many its state has."""
-        states = (np.shape(self.values[name])[: self._own(name)] for name in self.definition.memory)
-        return sum(prod(each.shape) for each in self.targets(system)), sum(prod(shape) for shape in states)
+        return sum(prod(each.shape) for each in self.targets(system)), self._states(system)
+
+    def _states(self, system: System) -> int:
+        return sum(prod(np.shape(self.values[name])[: self._own(name)]) for name in self.definition.memory)
 
     def _timing(self) -> Timing:
         if self.timing is None:
@@ -350,6 +413,16 @@ class Controller(Part):
             del rest[: prod(each.shape)]
         return parameters
 
+    def held_places(self, system: System) -> dict[str, list[int]]:
+        """Where among what it remembers what it holds stands, by the name of what it sets."""
+        places = iter(self.loop(system, self._in_steps()).held(list(range(self.remembers(system)))))
+        return {each.name: [next(places) for _ in range(prod(each.shape))] for each in self.targets(system)}
+
+    def held(self, system: System, name: str, memory: list[Any]) -> Any:
+        """What it holds between two steps for a parameter that it sets: the axes of that, then the batch."""
+        block = np.stack(np.broadcast_arrays(*(memory[i] for i in self.held_places(system)[name])))
+        return block.reshape((*system.recorded_shapes()[name], *block.shape[1:]))
+
     def _in_steps(self) -> dict[str, Array]:
         """Its timing, as parameters."""
         steps, _, later = self._timing()
@@ -361,7 +434,7 @@ class Controller(Part):
         made = [self._traced(system, tape, places) for _ in range(2)]
         if [each.id for each in made[0]] != [each.id for each in made[1]]:
             raise TraceError(
-                f"{self.definition.name}: expected the same operations at every call, got others: a function of a step may not "
+                f"{self.name}: expected the same operations at every call, got others: a function of a step may not "
                 f"draw random numbers or count its calls"
             )
         sets = ",".join(each.row for each in self.targets(system))
@@ -372,8 +445,8 @@ class Controller(Part):
     def digest(self, system: System) -> str:
         """A hash of its operations, by which a saved run recognises it."""
         tape, places, rows = _core.Tape(), {}, 0
-        for name in self.definition.parameters:
-            places[f"controller.{name}"], rows = rows, rows + prod(self.values[name].shape[: self._own(name)])
+        for name in self.tunable:
+            places[f"controller.{name}"], rows = rows, rows + prod(self._value(name).shape[: self._own(name)])
         made = self._traced(system, tape, places)
         return hashlib.sha256(repr(tape.operations(made)).encode()).hexdigest()
 
@@ -383,8 +456,8 @@ class Controller(Part):
         blocks = [_symbols(shape, state) for shape in (system.v_shape, system.y_shape)]
         memory = [next(state) for _ in range(self._counts(system)[1])]
         own = {
-            name: _symbols(self.values[name].shape[: self._own(name)], map(tape.param, count(places[f"controller.{name}"])))
-            for name in self.definition.parameters
+            name: _symbols(self._value(name).shape[: self._own(name)], map(tape.param, count(places[f"controller.{name}"])))
+            for name in self.tunable
         }
         v, y = blocks
         made = self._run(system, tape.time(), v, y, memory, own)
@@ -394,9 +467,10 @@ class Controller(Part):
         """The numbers that it sets, and those of its next state."""
         definition, rest = self.definition, iter(state)
         with np.errstate(all="ignore"):
-            blocks = [scalars(y, len(system.y_shape))]
-            if definition.has_v:
-                blocks.insert(0, scalars(v, len(system.v_shape)))
+            if definition.reads == ("z",):
+                blocks = [_outputs(system, v, y)]
+            else:
+                blocks = [scalars(v, len(system.v_shape)), scalars(y, len(system.y_shape))][-len(definition.reads) :]
             shapes = {name: self.values[name].shape[: self._own(name)] for name in definition.memory}
             memory = {name: _of_list(rest, shape) for name, shape in shapes.items()}
             own = {name: scalars(value, self._own(name)) for name, value in parameters.items()}
@@ -428,10 +502,7 @@ class Controller(Part):
 
     def at_start(self, system: System, batch: Shape) -> Array:
         """What it remembers at the start: rows of one number for each member."""
-        rows = [np.zeros(())]
-        for name in self.definition.memory:
-            value = aligned(self.values[name], self._own(name), batch)
-            rows += [value[index] for index in np.ndindex(*value.shape[: self._own(name)])]
+        rows = [np.zeros(()), *self._states_at_start(system, batch)]
         parameters, timing = system.own_parameters(batch), self._timing()
         before = []
         for each in self.targets(system):
@@ -443,11 +514,177 @@ class Controller(Part):
             memory[i] = row
         return memory
 
+    def _states_at_start(self, system: System, batch: Shape) -> list[Any]:
+        rows: list[Any] = []
+        for name in self.definition.memory:
+            value = aligned(self.values[name], self._own(name), batch)
+            rows += [value[index] for index in np.ndindex(*value.shape[: self._own(name)])]
+        return rows
+
     def remembers(self, system: System) -> int:
         """How many numbers it remembers."""
         set_, states = self._counts(system)
         timing = self._timing()
         return 1 + states + set_ * (timing.waiting + 1 + (timing.later > 0))
+
+
+class Controllers(Controller):
+    """Several sampled controllers around a system, which set different parameters, each with its own period and delay.
+
+    As one controller it has a sample wherever one of them may have one or put something out: its period is the greatest common
+    divisor of their periods and delays in steps. Its state is all that each of them remembers, so nothing that steps a system
+    knows of more than one.
+
+    Attributes:
+        each: the controllers, in the order in which they came.
+    """
+
+    each: tuple[Controller, ...] = ()
+
+    def __init__(self, each: tuple[Controller, ...]) -> None:
+        self.each = each
+
+    @property
+    def sets(self) -> tuple[str, ...]:  # type: ignore[override]
+        """The names of the parameters that they set."""
+        return tuple(name for each in self.each for name in each.sets)
+
+    @property
+    def name(self) -> str:
+        """The names of their functions."""
+        return ", ".join(each.name for each in self.each)
+
+    @property
+    def tunable(self) -> dict[str, tuple[Controller, str]]:
+        """Their parameters by name; one that several have is named by what its controller sets first, too."""
+        every = [(name, each) for each in self.each for name in each.tunable]
+        names = [name for name, _ in every]
+
+        def public(name: str, each: Controller) -> str:
+            return name if names.count(name) == 1 else f"{name}_{re.sub(r'[^0-9A-Za-z_]', '', each.sets[0])}"
+
+        return {public(name, each): (each, name) for name, each in every}
+
+    @property
+    def batch(self) -> Shape:
+        """The shape to which the values of all broadcast."""
+        return checks.batch_shape({f"controller {i}": each.batch for i, each in enumerate(self.each)})
+
+    def repr_arguments(self) -> list[str]:
+        """Each function, what it sets, and how often."""
+        return [text for each in self.each for text in each.repr_arguments()]
+
+    def __repr__(self) -> str:
+        return " and ".join(map(repr, self.each))
+
+    def _value(self, name: str) -> Array:
+        each, own = self.tunable[name]
+        return each._value(own)
+
+    def _own(self, name: str) -> int:
+        each, own = self.tunable[name]
+        return each._own(own)
+
+    def with_values(self, values: dict[str, Any]) -> Controller:
+        """These controllers with other numbers for some parameters."""
+        own = {
+            id(each): {name: values[known] for known, (of, name) in self.tunable.items() if of is each and known in values}
+            for each in self.each
+        }
+        return changed(self, each=tuple(each.with_values(own[id(each)]) for each in self.each))
+
+    def member(self, one: Callable[..., Array]) -> Self:
+        """The controllers for one member of a batch."""
+        return changed(self, each=tuple(each.member(one) for each in self.each))
+
+    def over_steps(self, dt: float) -> Controller:
+        """These controllers with their times in steps of this length; within, those of each in samples of the whole.
+
+        Raises:
+            ArgumentError: if they are no whole numbers of steps.
+        """
+        each = [one.over_steps(dt) for one in self.each]
+        tick = gcd(*(steps for one in each for steps in (one._timing().steps, one._timing().later)))
+        inner = (Timing(one._timing().steps // tick, one._timing().waiting, one._timing().later // tick) for one in each)
+        within = tuple(changed(one, timing=timing) for one, timing in zip(each, inner, strict=True))
+        return changed(self, each=within, timing=Timing(tick, 0, 0))
+
+    @property
+    def loop_key(self) -> tuple[Any, ...]:
+        """What is the same of controllers that remember the same."""
+        return (self.timing, *super().loop_key)
+
+    @property
+    def cycle(self) -> int:
+        """After so many steps all samples are where they were."""
+        return self._timing().steps * lcm(*(each.cycle for each in self.each))
+
+    def _first(self, system: System) -> list[int]:
+        """Where in its state begins what each of them remembers, and where that ends."""
+        first = [0]
+        for each in self.each:
+            first.append(first[-1] + each.remembers(system))
+        return first
+
+    def counters(self, system: System) -> list[int]:
+        """Where among what it remembers samples are counted."""
+        return [0, *(1 + first for first in self._first(system)[:-1])]
+
+    def _states(self, system: System) -> int:
+        return self._first(system)[-1]
+
+    def digest(self, system: System) -> str:
+        """A hash of the operations of each."""
+        return " ".join(each.digest(system) for each in self.each)
+
+    def _run(self, system: System, t: Any, v: Any, y: Any, state: list[Any], parameters: dict[str, Any]) -> list[Any]:
+        """What each puts out at a sample of the whole, and what each remembers then."""
+        numbers: list[Any] = []
+        following: list[Any] = []
+        first = self._first(system)
+        for i, each in enumerate(self.each):
+            own = {f"controller.{name}": parameters[known] for known, (of, name) in self.tunable.items() if of is each}
+            loop = each.loop(system, own | each._in_steps())
+            out, memory = loop.step(t, v, y, state[first[i] : first[i + 1]])
+            numbers, following = numbers + out, following + memory
+        return numbers + following
+
+    def _states_at_start(self, system: System, batch: Shape) -> list[Any]:
+        return [row for each in self.each for row in each.at_start(system, batch)]
+
+
+def _output_rows(system: System) -> Array:
+    """The rows of C of a linear system whose outputs a controller reads.
+
+    Raises:
+        UnsupportedError: if it has none, or they are not functions of the state alone that all members have in common.
+    """
+    C, D = (getattr(system, name, None) for name in "CD") if system.kernel == "linear" else (None, None)
+    if C is None:
+        raise UnsupportedError(
+            f"part: expected a linear system with outputs (C) for a controller of (t, z, …), got {system!r}; a controller of its "
+            f"state computes what it needs of that itself"
+        )
+    if D is not None and D.any():
+        raise UnsupportedError(
+            f"part: {system!r} adds inputs to its outputs (D), and a controller at a sample does not know the inputs of the step "
+            f"after it; take the states, (t, y, …)"
+        )
+    if C.ndim > 2:
+        raise UnsupportedError(f"part: expected one C for all members for a controller of (t, z, …), got shape {C.shape}")
+    rows: Array = C
+    return rows
+
+
+def _outputs(system: System, v: Any, y: Any) -> Any:
+    """C·s as an array of scalars; what is multiplied by zero is left out."""
+    order = [*system.velocities, *system.coordinates]  # type: ignore[attr-defined]  # a linear system
+    states = dict(zip(order, [Scalar(each) for block in (v, y) for each in block], strict=True))
+    z = np.empty(len(rows := _output_rows(system)), dtype=object)
+    for i, row in enumerate(rows):
+        terms = [states[j] if row[j] == 1.0 else float(row[j]) * states[j] for j in np.flatnonzero(row)]
+        z[i] = sum(terms[1:], terms[0]) if terms else 0.0 * states[0]
+    return array(z)
 
 
 def _whole(name: str, time: float, dt: float) -> int:
@@ -477,7 +714,7 @@ def target(system: System, name: str) -> Target:
             key, place = "inputs", list(inputs).index(name)
         if not isinstance(inputs[name].signal(), Constant):
             raise ArgumentError(f"sets: expected a parameter that is a number, got {name}, which changes with the time")
-        return Target(key, place, name if place is None else f"inputs[{place}]", ())
+        return Target(name, key, place, name if place is None else f"inputs[{place}]", ())
     if name in system.input_names or (name in parameters and parameters[name] is None):
         raise ArgumentError(
             f"sets: {name} was left out, so it is no part of the step; give it the value that it has before the first output of "
@@ -487,7 +724,7 @@ def target(system: System, name: str) -> Target:
         value = parameters[name]
         if not isinstance(value, np.ndarray):
             raise ArgumentError(f"sets: expected a parameter that is a number, got {name}, which changes with the time")
-        return Target(direct[name], None, direct[name], value.shape[: _own_axes(system, name)])
+        return Target(name, direct[name], None, direct[name], value.shape[: _own_axes(system, name)])
     known = ", ".join(dict.fromkeys([*direct, *inputs, *system.input_names])) or "none"
     raise UnknownNameError(f"sets: expected a parameter of the system that may have any value, got {name!r}. Known: {known}.")
 

@@ -60,8 +60,15 @@ NOT_HERE = {
     r"euler_maruyama|.*milstein.*|sri?w?\d?|sra\d?|sosri\d?|sosra\d?|langevin|baoab|.*stochastic.*": (
         "for equations with noise, and there is none here; noise that is held over a step is an input, sw.Sampled."
     ),
-    r"tsit(ouras)?_?5.*|vern(er)?_?\d|(bogacki_shampine|bs|rk|ode)_?(3|23|32)|cash_karp|rkck|(ode|rk)(78|89)|ode113|feagin.*": (
-        "not here; merson, fehlberg, fehlberg_5, dop853 and taylor choose their steps, with tolerance= and at=."
+    r"vern(er)?_?[68].*|dverk|(bogacki_shampine|bs)_?5.*|cash_karp|rkck|(ode|rk)(78|89)|ode113|feagin.*": (
+        "not here; dopri5, tsit5, vern7, dop853, vern9 and others choose their steps, with tolerance= and at=."
+    ),
+    r"kutta_?3|rk_?3_.*|ssp.*": ("not here; write it as a function, stepwell.method(function), which goes wherever a name does."),
+    r"ias_?\d*|mercurius": (
+        "REBOUND's, and not here; take taylor or dop853 with tolerance= and at=, or wisdom_holman for planets around a star."
+    ),
+    r"gillespie.*|ssa|tau_leap.*|.*next_reaction.*": (
+        "for stochastic simulation, which is not here; the methods step mean rates."
     ),
     r"adams.*|abm?_?\d?|.*multistep.*|gear.*|stormer_cowell": (
         "a method of several steps, and none of them is here; you can write one: stepwell.method(function, start=…)."
@@ -75,13 +82,13 @@ class Names(NamedTuple):
     Attributes:
         methods: the methods that have a name; more than one if it is ambiguous.
         qualified: for a name without its remark in parentheses, as RK2 of "RK2 (trapezoidal)", the methods and full names.
-        friends: for the name of a method that stepwell does not have, its usual name and the methods nearest to it.
+        friends: for the name of a method that stepwell does not have, the methods nearest to it.
         written: each name as the records write it.
     """
 
     methods: dict[str, list[str]]
     qualified: dict[str, list[tuple[str, str]]]
-    friends: dict[str, tuple[str, list[str]]]
+    friends: dict[str, list[str]]
     written: dict[str, str]
 
 
@@ -106,15 +113,10 @@ def names_of(methods: Iterable[Named]) -> Names:
                 names.qualified.setdefault(short, []).append((method.name, name))
     for method in methods:  # a method's own name is never ambiguous
         names.methods[spelling(method.name)] = [method.name]
-    direct = [(method.name, *friend.partition(", which is ")[::2]) for method in methods for friend in method.false_friends]
-    # A false friend by its own name is nearer than one by another of its names.
-    indirect = [(holder, real, "") for holder, _, real in direct if real]
-    named = {spelling(name) for _, name, _ in direct}
-    for holder, name, real in [*direct, *(each for each in indirect if spelling(each[1]) not in named)]:
+    for holder, name in [(method.name, friend) for method in methods for friend in method.false_friends]:
         key = spelling(name)
         if key not in names.methods and spelling(_without_remark(name)) not in names.methods:
-            what, near = names.friends.get(key, ("", []))
-            names.friends[key] = max(what, real, key=len), [*near, holder]
+            names.friends.setdefault(key, []).append(holder)
             names.written.setdefault(key, name)
     return names
 
@@ -168,11 +170,7 @@ def _explained(name: str, key: str, names: Names) -> str:
     """The meaning of the name of a method that stepwell does not have, and the nearest methods."""
     if why := _why_not_here(key):
         return f"{name} is {why}"
-    what, near = names.friends[key]
-    real = spelling(what) if what else key
-    near = names.friends[real][1] if real in names.friends else near
-    text = f"{name} is {what}, which is not here" if what else f"{names.written[key]} is not here"
-    return f"{text}; nearest, but not the same: {', '.join(dict.fromkeys(near))}."
+    return f"{names.written[key]} is not here; nearest, but not the same: {', '.join(names.friends[key])}."
 
 
 def _without_remark(name: str) -> str:

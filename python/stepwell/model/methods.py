@@ -15,7 +15,7 @@ from ..base import checks, registry
 from ..base.arrays import Array, Blocks, Scaled
 from ..base.immutable import Immutable
 from ..base.reprs import facts
-from ..errors import ArgumentError, UnsupportedError
+from ..errors import ArgumentError, DTypeError, UnsupportedError
 
 
 class Steps(Protocol):
@@ -363,4 +363,6 @@ def method(name: Any = None, *, start: Any = None) -> Any:
         from .method_names import resolved  # not at the top: importing stepwell must be fast
 
         return resolved(str(name), _catalogue())
+    if hasattr(name, "with_arguments"):
+        raise DTypeError(f"method: expected the name of a method, got {checks.short(name)}; the system stands before the method")
     return _catalogue()[checks.known("method", name, _catalogue())]

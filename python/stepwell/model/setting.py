@@ -55,7 +55,7 @@ def _of_control(system: System) -> dict[str, tuple[str, float]]:
 def _of_controller(system: System) -> dict[str, tuple[str, float]]:
     """The parameters of the system's sampled controller."""
     controller = system.controller
-    return {} if controller is None else {name: (f"controller.{name}", checks.ANY) for name in controller.definition.parameters}
+    return {} if controller is None else {name: (f"controller.{name}", checks.ANY) for name in controller.tunable}
 
 
 def known_names(system: System) -> tuple[str, ...]:
@@ -79,6 +79,8 @@ def check_name(system: System, name: str) -> None:
         raise UnsupportedError(
             f"{name}: the sampled controller sets it, so a number for it would not be read; set the controller's"
         )
+    if name in ("C", "D", "num", "den") and system.controller is not None and system.controller.reads_outputs:
+        raise UnsupportedError(f"{name}: the sampled controller reads outputs by it, which is part of the step; {ANEW}")
     arguments, names = system.arguments(), known_names(system)
     if name in names:
         return

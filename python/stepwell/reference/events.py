@@ -99,20 +99,15 @@ def may_change(before: Array, g: Array) -> Any:
     return may
 
 
-def near(g: Array, before: Array) -> Any:
-    """Whether g is so small against its change from another state that it may be zero within a step or two."""
-    with np.errstate(all="ignore"):
-        return ~(np.abs(g) > REACH * np.abs(g - before))
-
-
 def sides(parts: Parts) -> tuple[Array, Array]:
     """The sign of g just after the beginning of each part and just before its end; where g is zero, by its slope.
 
-    So a zero of g at the end of a step belongs to that step and not to the next one. NaN has no sign.
+    So a zero of g at the end of a step belongs to that step and not to the next one. A g that begins at zero and ends there
+    without a slope has not left it. NaN has no sign.
     """
     begin = np.where(parts.g_low == 0.0, np.sign(parts.slope_low), np.sign(parts.g_low))
     end = np.where(parts.g_high == 0.0, -np.sign(parts.slope_high), np.sign(parts.g_high))
-    return begin, np.where(end == 0.0, begin, end)
+    return begin, np.where((end == 0.0) & (parts.g_low != 0.0), begin, end)
 
 
 def bends(parts: Parts) -> Any:
@@ -161,7 +156,8 @@ def parted(look: Look, parts: Parts) -> tuple[Parts, Whole]:
         middle = np.where(leaves_zero[split] & (halving % 3 < 2), _return(parts), 0.5 * (parts.low + parts.high))
         g, slope, v, y = look(parts.of, middle)
         first_half = parts._replace(high=middle, g_high=g, slope_high=slope, v=v, y=y)
-        parts = joined([first_half, parts._replace(low=middle, g_low=g, slope_low=slope)])
+        lies = (parts.g_low == 0.0) & (g == 0.0) & (slope == 0.0)  # it has not left zero yet, and is on the same side
+        parts = joined([first_half, parts._replace(low=middle, g_low=g, slope_low=np.where(lies, parts.slope_low, slope))])
     once = joined(brackets)
     return once.some(np.lexsort((once.high, once.of))), stuck
 

@@ -6,6 +6,8 @@ series along one number of the state, or along the time.
 
 from __future__ import annotations
 
+import operator
+from functools import reduce
 from typing import Any
 
 import numpy as np
@@ -114,6 +116,11 @@ class Implicit:
             for j in range(of_v):
                 r_y[k] = _plus(r_y[k], product(self._entry(gamma, of_v + k, j), x[j]))
         return self._blocks(x, r_y)
+
+    def square(self, v: Array, y: Array) -> Any:
+        """The sum of the squares of all numbers of a member, from the first on."""
+        squares = [row * row for row in (*self._rows(v, 0), *self._rows(y, 1))]
+        return reduce(operator.add, squares)
 
     def by_time(self, h: Any) -> Blocks:
         """H times the derivatives of both rates by the time."""

@@ -9,13 +9,15 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable, Sequence
+from fractions import Fraction
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from .marks import KINDS, Mark
+from .bits import equal, magnitude, where
+from .marks import KINDS, Mark, mark
 from .tape import rules
-from .tape.operations import of_numbers, of_symbols
+from .tape.operations import ON_BITS, of_numbers, of_symbols
 
 #: A coefficient; None if it is known to be zero.
 Term = Any
@@ -39,10 +41,31 @@ BRANCHES = {
 }
 
 
-class Book:
-    """The numbers that change with time, each after its operands, and the functions and branches among them."""
+#: Functions with derivatives that are not finite at the ends of their domains. There these count as zero, as a root's do at zero.
+ENDS = frozenset(("cbrt", "arcsin", "arccos", "hypot", "arctan2"))
+#: Functions that are made of pieces.
+PIECES = frozenset(
+    ("abs", "sign", "copysign", "floor", "ceil", "trunc", "round", "mod", "remainder", "minimum", "maximum", "clip")
+)
+#: The name of xᵖ⁻ʲ at x = 0, where the derivatives of xᵖ do not follow from xᵖ, as a function of x, p and j; and the largest j.
+LOWERED, MOST_LOWERED = "lowered power", 4
+#: A base up to this size is zero.
+TINY = 2.0**-930
 
-    def __init__(self) -> None:
+
+class Book:
+    """The numbers that change with time, each after its operands, and the functions and branches among them.
+
+    Attributes:
+        ends: whether the rates are a user's, which may begin at the ends of domains and far from the middle of what saturates.
+        divides: whether coefficients of order k are divided by k. The rounding of its reciprocal is in all of them alike, so
+            that the energy of a long motion goes to one side. In steps of fixed length they are multiplied by it.
+    """
+
+    ends = False
+
+    def __init__(self, *, divides: bool = False) -> None:
+        self.divides = divides
         self.series: list[Series] = []
         self.functions: dict[Any, Series] = {}
         self.branches: list[Branch] = []
@@ -150,7 +173,7 @@ class Series:
 
         def rule(k: int) -> Term:
             if not over:
-                over.append(0.5 / root)
+                over.append(where(equal(root, 0.0), 0.0, 0.5 / root) if self.book.ends else 0.5 / root)
             pairs = None
             for j in range((k + 1) // 2 - 1, 0, -1):
                 pairs = _sum(pairs, _product(series.terms[j], series.terms[k - j]))
@@ -286,6 +309,12 @@ def _convolved(a: Sequence[Term], b: Sequence[Term], k: int) -> Term:
     return _sum(_sum(_sum(of_a, of_b), middle), newest)
 
 
+def _finite_term(x: Series, k: int) -> Term:
+    """A coefficient above order 0 of a divisor, or of what a function depends on: what is infinite counts as constant."""
+    term = x.terms[k]
+    return where(magnitude(x.terms[0]) < np.inf, term, 0.0) if x.book.ends and term is not None else term
+
+
 def _quotient(start: Any, dividend: Callable[[int], Term], divisor: Series, sign: int = 0) -> Series:
     """C = a/b: from c·b = a. ``sign`` is that of a reciprocal ±1/b, which is its own factor, and else 0."""
     over: list[Any] = []
@@ -293,7 +322,7 @@ def _quotient(start: Any, dividend: Callable[[int], Term], divisor: Series, sign
     def rule(k: int) -> Term:
         known = None
         for j in range(1, k + 1):
-            known = _sum(known, _product(divisor.terms[j], series.terms[k - j]))
+            known = _sum(known, _product(_finite_term(divisor, j), series.terms[k - j]))
         if sign:
             return None if known is None else -(known * start) if sign > 0 else known * start
         if not over:
@@ -333,23 +362,61 @@ def _identity(x: Any) -> Any:
 
 def has_rule(mark: Mark) -> bool:
     """Whether a marked value is treated as a function. Roots and squares are operations like others."""
-    return mark.name in rules.PARTIALS and mark.name not in ("sqrt", "square")
+    return mark.name == LOWERED or (mark.name in rules.PARTIALS and mark.name not in ("sqrt", "square"))
 
 
 def factors(mark: Mark, value: Any, wanted: list[bool]) -> tuple[Any, ...]:
     """The derivatives of a function by its arguments, as symbols or as series; None for those that are not wanted or zero.
 
-    That of xᵖ by x is p·xᵖ/x here, which needs no further power.
+    That of xᵖ by x is p·xᵖ/x here, which needs no further power, and at x = 0 what p·xᵖ⁻¹ is. That of y = tanh x is 1 − y², which
+    needs no cosh, and is zero where y is rounded to 1: it must not tell of a motion that rates do not have.
     """
-    if mark.name != "power":
-        return rules.of_function(mark, value, wanted)
-    x, p = mark.arguments
-    by_exponent = value * rules.function("log", mark.function)(x) if wanted[1] else None
-    return p * (value / x) if wanted[0] else None, by_exponent
+    if mark.name == "tanh":
+        return (1.0 - value * value,)
+    if mark.name not in ("power", LOWERED):
+        by = rules.of_function(mark, value, wanted)
+        return tuple(map(_finite, by)) if mark.name in ENDS else by
+    x, p = mark.arguments[:2]
+    by_exponent = _finite(value * rules.function("log", mark.function)(x)) if wanted[1] and mark.name == "power" else None
+    if mark.name == LOWERED:
+        j = mark.arguments[2]
+        return ((p - float(j)) * _lowered(x, p, j + 1) if wanted[0] else None), by_exponent, None
+    if not wanted[0]:
+        return None, by_exponent
+    at_zero = 0.0 if isinstance(p, (int, float)) else _lowered(x, p, 1)
+    return p * _either(_is_zero(x), at_zero, value / x), by_exponent
+
+
+def _finite(factor: Any) -> Any:
+    """A derivative where it is finite, else zero."""
+    if factor is None or isinstance(factor, float) or (isinstance(factor, Series) and not factor.book.ends):
+        return factor
+    return _either(magnitude(at_start(factor)) < np.inf, factor, 0.0)
+
+
+def _either(truth: Any, yes: Any, no: Any) -> Any:
+    """One of two numbers by a truth at the start of the step."""
+    book = next((each.book for each in (yes, no) if isinstance(each, Series)), None)
+    return where(truth, yes, no) if book is None else Truth(book, truth).choose(yes, no)
+
+
+def _is_zero(x: Any) -> Any:
+    """Whether a base is zero, or so small that its reciprocal overflows; its powers are zero then."""
+    return magnitude(at_start(x)) <= TINY
+
+
+def _lowered(x: Any, p: Any, j: int) -> Any:
+    """xᵖ⁻ʲ at x = 0, with the derivatives that it has there up to the largest j, and zero elsewhere."""
+    value = where(_is_zero(x) & equal(at_start(p), float(j)), 1.0, 0.0)
+    if j > MOST_LOWERED:
+        return value
+    return of_function(Mark(LOWERED, (x, p, j), None), value, x.book) if isinstance(x, Series) else mark(LOWERED, value, x, p, j)
 
 
 def operation(book: Book, name: str, of: list[Any], extra: int) -> Any:
-    """An operation of a tape, on series and numbers."""
+    """An operation of a tape, on series and numbers. Whole numbers and bits are taken as they are at the start of the step."""
+    if name in ("floor", *ON_BITS) and not any(isinstance(each, Truth) for each in of):
+        of = [_start(each) for each in of]
     if not any(isinstance(each, (Series, Truth)) for each in of):
         if any(hasattr(each, "xor_bits") for each in of):
             return of_symbols(name, of, extra)
@@ -373,10 +440,12 @@ def of_function(mark: Mark, start: Any, book: Book) -> Series:
         total = None
         for argument, factor in zip(mark.arguments, by, strict=True):
             for j in range(1, k + 1) if factor is not None else ():
-                slope = _product(float(j), argument.terms[j])
+                slope = _product(float(j), _finite_term(argument, j))
                 of_factor = factor.terms[k - j] if isinstance(factor, Series) else (factor if j == k else None)
                 total = _sum(total, _product(slope, of_factor))
-        return None if total is None else (1.0 / k) * total
+        if total is None:
+            return None
+        return part_of(total, k) if book.divides else (1.0 / k) * total
 
     series = Series(book, start, rule)
     return series
@@ -384,15 +453,24 @@ def of_function(mark: Mark, start: Any, book: Book) -> Series:
 
 def coefficients(s: Any, order: int, t: Any, h: Any, v: Any, y: Any) -> list[tuple[Any, Any]]:
     """The Taylor coefficients of v and y around t, from the first to that order, in powers of the share of the step h."""
-    return expanded(s, order, t, (h, 1.0), v, y)[0]
+    return expanded(s, order, t, (h, 1.0), v, y, divides=False)[0]
 
 
-def expanded(s: Any, order: int, t: Any, lengths: tuple[Any, Any], v: Any, y: Any) -> tuple[list[tuple[Any, Any]], list[Branch]]:
+def part_of(number: Any, k: int) -> Any:
+    """A number divided by k, without the rounding of 1/k, in a third of the time of a division."""
+    reciprocal = 1.0 / k
+    rest = float(Fraction(1, k) - Fraction(reciprocal))
+    return reciprocal * number + rest * number if rest else reciprocal * number
+
+
+def expanded(
+    s: Any, order: int, t: Any, lengths: tuple[Any, Any], v: Any, y: Any, *, divides: bool = True
+) -> tuple[list[tuple[Any, Any]], list[Branch]]:
     """The same coefficients, and the branches of functions that the rates are on.
 
     ``lengths`` are the unit of time in powers of which the coefficients are, and this over the step to which ``s`` is scaled.
     """
-    book, (h, unit) = Book(), lengths
+    book, (h, unit) = Book(divides=divides), lengths
     v, y = np.asarray(v), np.asarray(y)
     blocks = [in_array([Series(book, each, None) for each in block.flat], block.shape) for block in (v, y)]
     # Where members have steps of their own, each needs a time of its own, though all are equal at the start.
@@ -408,14 +486,16 @@ def expanded(s: Any, order: int, t: Any, lengths: tuple[Any, Any], v: Any, y: An
     result = []
     for k in range(order):
         book.advance(k)
-        by = None if k == 0 and _is(unit, 1.0) else unit * (1.0 / (k + 1))
+        over = k + 1 if divides and (k + 1) & k else None  # of a power of two the reciprocal is exact
+        by = None if k == 0 and _is(unit, 1.0) else unit if over is not None else unit * (1.0 / (k + 1))
         by_each: list[Any] = len(seeds) * [by]
         if by is not None and np.ndim(by):
             by_each = [each for block in blocks for each in np.broadcast_to(by, block.shape).flat]
         terms = []
         for seed, rate, factor in zip(seeds, slopes, by_each, strict=True):
             known = rate.terms[k] if isinstance(rate, Series) else (None if k else rate)
-            terms.append(known if known is None or factor is None else factor * known)
+            term = known if known is None or factor is None else factor * known
+            terms.append(term if term is None or over is None else part_of(term, over))
             seed.terms.append(terms[-1])
         for time, length in clocks:
             time.terms.append(length if k == 0 else None)

@@ -4,6 +4,9 @@ The last two coefficients give the length of a step beforehand (Jorba and Zou 20
 coefficients and τ its tolerated error, the term j is as small as is tolerated at (τ/‖cⱼ‖)^(1/j). The step is the least of
 these for j = p − 1 and p and all groups, times exp(−0.7/(p − 1)), but at most half of the radius of convergence. It is rejected
 only if a function might leave its branch within it, if a number is not finite or if it does not move the time.
+
+Sums are compensated: what rounding leaves out of a number at the end of a step, the next step adds. These roundings would be as
+large as those within the steps.
 """
 
 from __future__ import annotations
@@ -12,13 +15,28 @@ import functools
 import math
 import operator
 from collections.abc import Callable, Sequence
+from math import prod
 from typing import Any
 
 import numpy as np
 
 from ..base.arrays import Array
 from .acceptance import Acceptance
-from .adaptive import MAX_FACTOR, ONSET, ROUNDING, Attempted, Pace, largest, longer, numbers_in, over, sizes, stacked, total
+from .adaptive import (
+    LEAST_PART,
+    MAX_FACTOR,
+    ONSET,
+    ROUNDING,
+    Attempted,
+    Pace,
+    largest,
+    longer,
+    numbers_in,
+    over,
+    sizes,
+    stacked,
+    total,
+)
 from .bits import DOUBLE, add_bits, and_bits, at_most, less, shift_up, where
 from .log import split
 from .series import Branch, expanded
@@ -82,7 +100,9 @@ def attempt(
     step = where(ends, bound, far)
     length = where(outlook.is_extra, pace.extra, step)
     share = length * (1.0 / unit)
-    v1, y1 = (value(start, [term[i] for term in terms], share) for i, start in enumerate((v, y)))
+    low: tuple[Any, Any] = lows(v, y, pace) if acceptance.compensated else (0.0, 0.0)
+    changes = [value(rest, [term[i] for term in terms], share) for i, rest in enumerate(low)]
+    (v1, low_v), (y1, low_y) = compensated(v, changes[0]), compensated(y, changes[1])
     new = sizes(v1, y1, block_axes, groups)
     slope_v, slope_y = (value(terms[0][i], [(k + 1.0) * term[i] for k, term in enumerate(terms[1:], 1)], share) for i in range(2))
     end = pace.t + length
@@ -97,8 +117,12 @@ def attempt(
         stays = on_branches(branches, share, moved)
     validity = agrees, stays, 0.5 / moved * unit
     following, goes_on = decided(pace, (step, ends), new, validity, outlook.is_extra, outlook.runs)
+    takes = goes_on & ~outlook.is_extra
     if work is not None:
-        following = following._replace(work=where(goes_on & ~outlook.is_extra, pace.work + work, pace.work))
+        following = following._replace(work=where(takes, pace.work + work, pace.work))
+    if acceptance.compensated:
+        new_low = np.concatenate([np.asarray(each).reshape(-1, *pace.low.shape[1:]) for each in (low_v, low_y)])
+        following = following._replace(low=where(takes, new_low, pace.low))
     return following, where(goes_on, v1, v), where(goes_on, y1, y)
 
 
@@ -125,6 +149,19 @@ def value(start: Array, terms: Sequence[Array], share: Any) -> Array:
     return end
 
 
+def lows(v: Array, y: Array, pace: Pace) -> tuple[Array, Array]:
+    """What v and y are more than the state has."""
+    of_v = np.size(v) // max(1, prod(pace.low.shape[1:]))
+    return pace.low[:of_v].reshape(np.shape(v)), pace.low[of_v:].reshape(np.shape(y))
+
+
+def compensated(start: Array, change: Array) -> tuple[Array, Array]:
+    """The sum of both, and what its rounding leaves out, exactly (Møller 1965; Knuth 1969)."""
+    end = start + change
+    added = end - start
+    return end, (start - (end - added)) + (change - added)
+
+
 def reach(
     order: int,
     pace: Pace,
@@ -137,8 +174,8 @@ def reach(
 ) -> tuple[Any, Any, Any]:
     """The step that is tolerated, the motion in a unit of time over the tolerated error, and the tolerated defect times the step.
 
-    The defect of a group is by how much the series and the rates at the end of the step differ. Times the step it is p + 1 times
-    the first term that is left out.
+    The error is that of the largest sizes so far. The defect of a group is by how much the series and the rates at the end of the
+    step differ. Times the step it is p + 1 times the first term that is left out.
 
     In ``before`` the pace has the length of the last step that was taken, at the start that of a step to try first. A held one
     does not count, for it is made once more and must be the same.
@@ -153,11 +190,17 @@ def reach(
     for block in (slice(0, counts[0]), slice(counts[0], sum(counts))):
         longest, now = pace.longest[block], present[block]
         onset = ONSET * longer(largest(longest), largest(now)) if len(now) > 1 else 0.0
-        standing += [where(less(0.0, size), size, onset) if len(now) > 1 else size for size in longest]
-    counts_as = longer(where(less(0.0, pace.lasts), stacked(standing), present), first * (pace.before * (1.0 / unit)))
-    tolerated = absolute + relative * counts_as
-    # What begins at zero, where nothing else has been, tolerates no error: it does not count.
-    bound = where(less(0.0, tolerated), tolerated, np.inf)
+        for size in longest:
+            standing.append(where(less(0.0, size), LEAST_PART * size, onset) if len(now) > 1 else LEAST_PART * size)
+    counts_as = longer(where(less(0.0, pace.lasts), stacked(standing), 0.0), present)
+    counts_as = longer(counts_as, first * (pace.before * (1.0 / unit)))
+
+    def bound_of(size: Any) -> Any:
+        # What begins at zero, where nothing else has been, tolerates no error: it does not count.
+        tolerated = absolute + relative * size
+        return where(less(0.0, tolerated), tolerated, np.inf)
+
+    bound = bound_of(counts_as)
 
     def logarithm(size: Any) -> Any:
         # A size that is not a number counts as the largest: which bits NaN has, its logarithm would show.
@@ -177,7 +220,12 @@ def reach(
     far = rough_exp2(where(less(by_radius, by_error), by_radius, by_error)) * unit
     limited = where(less(1.0, pace.most), pace.most, 1.0)
     most = where(less(pace.most, MAX_FACTOR), limited, MAX_GROWTH) * pace.before
-    return pace.shortened(where(less(most, far), most, far), pace.t), moved, DEFECT * (order + 1.0) * (bound + lost)
+    # A defect may be rounding of rates that are differences of larger numbers, and a branch may end at zero, so both are compared
+    # with the largest sizes so far.
+    so_far = longer(where(less(0.0, pace.lasts), pace.longest, 0.0), counts_as)
+    bound = bound_of(so_far)
+    allowed = DEFECT * (order + 1.0) * (bound + ROUNDING * so_far)
+    return pace.shortened(where(less(most, far), most, far), pace.t), over(first, bound), allowed
 
 
 def on_branches(branches: Sequence[Branch], share: Any, moved: Any) -> Any:

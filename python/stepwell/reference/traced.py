@@ -162,9 +162,9 @@ class Tracer:
 
     def pace(self, acceptance: Acceptance, more: Iterator[Any]) -> adaptive.Pace:
         """The pace as a part of the state."""
-        groups = sum(acceptance.counts(prod(self.system.v_shape), prod(self.system.y_shape)))
-        numbers = len(adaptive.Pace._fields) - 2 + groups * (3 if acceptance.own else 1)
-        return adaptive.Pace.of([next(more) for _ in range(numbers)], groups)
+        n = prod(self.system.v_shape), prod(self.system.y_shape)
+        numbers = len(adaptive.Pace._fields) - 5 + acceptance.numbers(*n)
+        return adaptive.Pace.of([next(more) for _ in range(numbers)], sum(acceptance.counts(*n)), acceptance.compensated * sum(n))
 
     def attempt(self, method: Any, order: int = 0, acceptance: Acceptance = Acceptance(), *, backward: bool = False) -> list[Any]:  # noqa: B008
         """The state and the pace after an attempt at an adaptive step, by a series of that order if it is one."""
@@ -203,9 +203,11 @@ class Tracer:
         return self.flat(v, y, *begun.numbers)
 
     def record(self, names: Sequence[str]) -> list[Any]:
-        """Quantities of a state."""
-        s, (v, y, _) = self._wrapped(self.tape.step()), self.state()
-        return self.flat(*(s.record(name, v, y) for name in names))
+        """Quantities of a state, and what a sampled controller holds."""
+        s, (v, y, more), system = self._wrapped(self.tape.step()), self.state(), self.system
+        memory = self._memory(more)
+        known = system.quantities
+        return self.flat(*(s.record(n, v, y) if n in known else system.controller.held(system, n, memory) for n in names))
 
     def matrix(self, nodes: Sequence[float], n: int, inputs: list[Any], carries: bool = False) -> list[Any]:
         """The state after a step in transition-matrix form, with these inputs."""

@@ -17,7 +17,8 @@ def adaptive_run(request: Request, waypoints: list[Array] | None = None) -> Run:
     """Make the run, without its diagnostics. Where its members stood on the way is added to ``waypoints``, if it is known."""
     assert request.step_control is not None
     plan, (pacing, paces, _, times, _, every, start), method = request.plan, request.step_control, request.plan.method
-    with_events, adapt, keeper = None, engine.adapt, None
+    adapt: Any = engine.adapt
+    with_events, keeper = None, None
     if waypoints is not None:
         pacing = pacing._replace(waypoints=True)
     if every is not None:
@@ -39,7 +40,7 @@ def adaptive_run(request: Request, waypoints: list[Array] | None = None) -> Run:
         out = adapt(plan if progress is None else plan._replace(progress=progress), pacing, paces, request.v, request.y)
     if waypoints is not None and out.waypoints is not None:
         waypoints.append(out.waypoints)
-    t, v, y = times[-len(out.v) :], out.v, out.y
+    t, v, y = times[-len(out.v) :].copy(), out.v, out.y  # the request may be remembered
     if keeper is not None:
         t, v, y = keeper.saved(plan, start, (np.broadcast_to(pacing.at[-1], plan.batch), v[-1], y[-1]))
         t = (-1.0 if plan.backward else 1.0) * t
@@ -72,7 +73,7 @@ def run_of(request: Request, out: engine.Adapted, t: Array, v: Array, y: Array) 
         system=request.system,
         method=method,
         dt=1.0,
-        t0=t0 if t0.ndim else t0.item(),
+        t0=t0.copy() if t0.ndim else t0.item(),
         start_step=0,
         steps=0,
         start=None,

@@ -134,12 +134,12 @@ def jump_times(system: System, jumps: Any, t0: Array, times: Array) -> Array | N
     return np.unique(together) if together.ndim == 1 else np.sort(together, axis=0)
 
 
-def pace_of(before: Continuation, method: Method, groups: int) -> Array:
-    """The step-size controllers of the run that goes on."""
+def pace_of(before: Continuation, method: Method, groups: int, low: int) -> Array:
+    """The step-size controllers of the run that goes on, with so many numbers that a series keeps."""
     continuation.goes_on_alike(before, method)
     assert isinstance(before.carry, AdaptiveState)
-    pace, expected = before.carry.pace, [engine.PACE_NUMBERS + each * groups for each in (1, 3)]
-    if len(pace) not in expected:
+    pace, expected = before.carry.pace, [engine.PACE_NUMBERS + each * groups for each in (engine.SCALES, engine.SCALES + 2)]
+    if len(pace) - low not in expected:
         raise ShapeError(
             "resume: expected a run of a system whose errors are relative to as many lengths; start anew from its last state: "
             "v=run.v[-1], y=run.y[-1], t0=run.t[-1]"
@@ -147,8 +147,8 @@ def pace_of(before: Continuation, method: Method, groups: int) -> Array:
     return pace
 
 
-def relative_tolerances(pace: Any, acceptance: Acceptance, groups: int) -> Array:
+def relative_tolerances(pace: Any, acceptance: Acceptance, groups: int, low: int) -> Array:
     """The relative tolerances of a run that goes on."""
     if not acceptance.own:
         return np.asarray(pace[engine.RELATIVE])
-    return np.asarray(pace[engine.PACE_NUMBERS + groups : engine.PACE_NUMBERS + 2 * groups])
+    return np.asarray(engine.own_tolerances(pace, groups, low)[:groups])

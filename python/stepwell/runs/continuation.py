@@ -64,7 +64,7 @@ class Continuation(NamedTuple):
         if self.memory is None or now is None:
             return None
         before = before.over_steps(self.options["dt"])
-        if (before.definition, before.sets, before.timing) != (now.definition, now.sets, now.timing):
+        if before.loop_key != now.loop_key:
             return None
         memory = self.memory.reshape(len(self.memory), *(1,) * (len(batch) - self.memory.ndim + 1), *self.memory.shape[1:])
         return np.array(np.broadcast_to(memory, (len(memory), *batch)), dtype=np.float64)
@@ -218,7 +218,7 @@ def _begun_anew(plan: engine.Plan, pacing: engine.Pacing, pace: Array) -> Array:
     """The step-size controllers of members that begin anew, with their tolerance, where they were saved or stopped."""
     time = standing(pace)
     groups = engine.groups_of(plan)
-    own = pace[engine.PACE_NUMBERS + groups :]
+    own = engine.own_tolerances(pace, groups, engine.low_numbers(plan))
     relative, absolute = (own[:groups], own[groups:]) if len(own) else (pace[engine.RELATIVE], pace[engine.ABSOLUTE])
     lasts = bool((pace[engine.LASTS] > 0.0).all())
     tolerances = engine.Tolerances(relative, None if lasts else absolute, len(own) > 0)

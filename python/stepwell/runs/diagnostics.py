@@ -19,13 +19,16 @@ from ..model.methods import Method
 from ..model.parameters import aligned
 from ..model.systems import NBody, System
 from . import encounters, engine, known_energy
-from .findings import Finding
+from .findings import Finding, may_have_amounts
 from .request import Request
-from .result import Run
+from .result import Run, Status
 from .tolerance import MAX_ABSOLUTE_SHARE, lost_in_tolerance
 
 #: A member's energy is doubtful where it changed by more than this share of its own size and of the kinetic energy.
 DOUBTFUL_CHANGE = 0.5
+#: Around a body with so many times the mass of all others together, the share is less in steps of fixed length: planets whose
+#: energy is a hundredth off are on other orbits, or these turn by steps alone.
+STAR, DOUBTFUL_OF_PLANETS = 10.0, 0.01
 
 #: The energy of one member of at most FEW_BODIES bodies is summed in floats. That takes some microseconds, little beside a run of
 #: FEW_EVALUATIONS.
@@ -81,27 +84,60 @@ def findings_of(
         noticed += of_stops(run, partial(why_steps_are_short, run, request, waypoints))
         if (stiff := _of_stiffness(run, request, waypoints, heard)) is not None:
             noticed.append(stiff)
+        least = MANY if run.y[-1].size + run.v[-1].size >= FEW_NUMBERS else MANY_OF_FEW
+        many = waypoints and run.paces.accepted.max() >= min(least, MANY)  # asked here, since a short run is to be quick
+        if many and heard(AccuracyWarning) and (grown := registry.task("amplified_of")(run, request, waypoints[0], least)):
+            noticed.append(grown)
+        if many and heard(ToleranceWarning) and (jump := registry.task("state_jump_of")(run, request, waypoints[0])):
+            noticed.append(jump)
         if (lost := _of_a_lost_motion(run, request)) is not None:
             noticed.append(lost)
-        from .negative import of_negative_amounts  # only such runs need it
-
-        if (negative := of_negative_amounts(run, request)) is not None:
-            noticed.append(negative)
+    if run.system.mass_matrix is not None and run.paces is None and heard(AccuracyWarning):
+        noticed += _of_algebraic_equations(run, request)
     # The energy says nothing where events changed the state, nor where the run began from what a method carries.
-    began = not request.carried and request.before is None
-    if request.events is not None and any(event.then for event in request.events):
-        began = False
+    changes = request.events is not None and any(event.then for event in request.events)
+    began = not request.carried and request.before is None and not changes
     start = (request.v, request.y) if began else None
     noticed += _of_nonsense(run, start, request, heard)
     if run.paces is None and start is not None and (growth := registry.task("growth_of")(run, start)) is not None:
         noticed.append(growth)
+    if may_have_amounts(run.system) and (run.paces is not None or not noticed) and not changes:
+        from .negative import of_a_run  # only such runs need it
+
+        if (amounts := of_a_run(run, request.y, request.plan)) is not None:
+            noticed.append(amounts.finding(run.status.shape))
     return tuple(noticed)
+
+
+def _of_algebraic_equations(run: Run, request: Request) -> list[Finding]:
+    """The members that lost their algebraic equations: fixed steps go on where these have no solution, or determine none."""
+    start = np.broadcast_to(request.y, run.y.shape[1:])
+    sizes = np.maximum(np.abs(run.y).max(axis=0), np.abs(start))
+    states = (start, run.t0), (run.y[-1], run.t[-1])
+    broken, crossed = (each & (run.status == 0) for each in registry.task("algebraic_lost")(run.system, *states, sizes))
+    lost = broken.any()
+    if not (wrong := broken if lost else crossed).any():
+        return []
+    some, first = int(wrong.sum()), tuple(np.argwhere(wrong)[0].tolist())
+    who = f"{share(some, wrong.shape, wrong.size)}{first_of(some, first, wrong.size)}"
+    steps = f"steps of {run.dt:g} by {run.method.name}"
+    text = (
+        f"at the end, t = {run.t[-1]:g}, the algebraic equations do not hold for {who}; they have no solution there, or {steps} "
+        f"lost it: take tolerance=, which stops there, or shorter steps"
+    )
+    if not lost:
+        text = (
+            f"at a time on the way, the algebraic equations determined nothing for {who}; there a solution ends, or is one of "
+            f"several, and {steps} went on: take tolerance=, or other equations from there"
+        )
+    return [Finding(AccuracyWarning, text, wrong)]
 
 
 def finds_growth_only(system: System, method: Method, steps: int) -> bool:
     """Whether nothing but growth can be found of a run of fixed steps, from its start, of which all numbers are finite."""
-    may_pass = known_energy.may_pass_barriers(system, method, steps)
-    return not isinstance(system, NBody) and type(system).doubt is System.doubt and system.keeper is None and not may_pass
+    judged = known_energy.may_pass_barriers(system, method, steps) or known_energy.may_gain(system, method, steps)
+    judged = judged or isinstance(system, NBody) or system.mass_matrix is not None or system.keeper is not None
+    return type(system).doubt is System.doubt and not judged
 
 
 def _of_nonsense(run: Run, start: State | None, request: Request, heard: Callable[[type[Warning]], bool]) -> list[Finding]:
@@ -109,13 +145,15 @@ def _of_nonsense(run: Run, start: State | None, request: Request, heard: Callabl
     system = run.system
     if not isinstance(system, NBody):
         about = system.doubt(run.y)
+        if about is None and start is not None and run.paces is None and known_energy.may_gain(system, run.method, run.steps):
+            about = known_energy.gain_of(run, start) if heard(AccuracyWarning) else None
         if about is None and start is not None:
             about = known_energy.doubt_of(run, start, None if request.step_control is None else partial(_visited, request), heard)
         return [] if about is None else [Finding(AccuracyWarning, *about)]
     noticed = []
     if run.force is None:
         ends = _ends(run, system, start) if system.keeps_energy else None
-        energy = None if ends is None else _of_energy(run.method.name, ends)
+        energy = None if ends is None else _of_energy(run.method.name, ends, _doubtful(run, system))
         if energy is None and system.keeps_energy and start is not None:
             energy = _of_massless(run, system, start)
         met = None
@@ -199,9 +237,11 @@ def _of_divergence(run: Run, request: Request) -> Finding | None:
 
 
 def why_steps_are_short(run: Run, request: Request, waypoints: Sequence[Array], index: Shape) -> str:
-    """Whether stability held down the steps of a member that is out of attempts, in words."""
+    """Why the steps of a member that stopped are short, in words: a jump of the rates, or stability if it is out of attempts."""
     assert run.paces is not None
-    if run.paces.accepted[index] + run.paces.rejected[index] < STOPPED:
+    if jump := registry.task("state_jump")(run, request, waypoints, index):
+        return str(jump)
+    if run.status[index] != Status.BUDGET or run.paces.accepted[index] + run.paces.rejected[index] < STOPPED:
         return ""
     return str(registry.task("held_by_stability")(run, request, waypoints, index))
 
@@ -353,10 +393,17 @@ def _numbers_of_pairs(run: Run, bodies: NBody) -> int:
     return run.status.size * (bodies.y_shape[0] + 2 * bodies.pair_count)
 
 
-def _of_energy(method: str, ends: Ends) -> tuple[str, Any, Shape] | None:
+def _doubtful(run: Run, bodies: NBody) -> Any:
+    """By which share the energy of each member may change at most."""
+    heaviest = bodies.masses.max(axis=0)
+    planets = (bodies.masses.sum(axis=0) <= (1.0 + 1.0 / STAR) * heaviest) & (bodies.force == "newton")
+    return np.where(planets & (run.paces is None), DOUBTFUL_OF_PLANETS, DOUBTFUL_CHANGE)
+
+
+def _of_energy(method: str, ends: Ends, share_of: Any) -> tuple[str, Any, Shape] | None:
     """A message, its members, and the first of them."""
     first, last, _ = ends
-    wrong = _changed(ends)
+    wrong = _changed(ends, share_of)
     if not wrong.any():
         return None
     index = tuple(np.argwhere(wrong)[0].tolist())
@@ -369,11 +416,11 @@ def _of_energy(method: str, ends: Ends) -> tuple[str, Any, Shape] | None:
     return text, wrong, index
 
 
-def _changed(ends: Ends) -> Any:
+def _changed(ends: Ends, share_of: Any = DOUBTFUL_CHANGE) -> Any:
     """Where the energy has another size at the end."""
     first, last, moved = ends
     with np.errstate(all="ignore"):
-        wrong = np.abs(last - first) > DOUBTFUL_CHANGE * np.maximum(moved, np.maximum(np.abs(first), np.abs(last)))
+        wrong = np.abs(last - first) > share_of * np.maximum(moved, np.maximum(np.abs(first), np.abs(last)))
     return wrong & np.isfinite(last)  # members that diverged were named before
 
 
@@ -460,7 +507,7 @@ def _of_few(bodies: NBody, start: State, end: State) -> Ends | None:
     """The energies of one member; None if they are not doubtful, without making an array."""
     (first, moved_first), (last, moved_last) = (_summed(bodies, v.tolist(), y.tolist()) for v, y in (start, end))
     moved = max(moved_first, moved_last)
-    if abs(last - first) <= DOUBTFUL_CHANGE * max(moved, abs(first), abs(last)):
+    if abs(last - first) <= DOUBTFUL_OF_PLANETS * max(moved, abs(first), abs(last)):
         return None
     return Ends(np.asarray(first), np.asarray(last), np.asarray(moved))
 

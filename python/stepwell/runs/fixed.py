@@ -48,7 +48,7 @@ def fixed_run(request: Request) -> Run:
         system=request.system,
         method=method,
         dt=plan.dt,
-        t0=plan.t0,
+        t0=plan.t0.copy() if isinstance(plan.t0, np.ndarray) else plan.t0,
         start_step=plan.first,
         steps=plan.steps,
         start=request.start,

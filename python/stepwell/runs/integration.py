@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
+from ..base import checks
 from ..model.controls import AnyControl
 from ..model.methods import Method
 from ..model.systems import System
@@ -24,6 +25,24 @@ if TYPE_CHECKING:
 NOTHING = ()
 
 
+#: What arguments of SciPy's and of other solvers are here.
+HINTS = {
+    "t_span": "its start is t0=, its end follows from dt= and steps=, or is the last of at= with tolerance=",
+    "t_eval": "with tolerance= the times of saved states are at=, with fixed steps each every=-th is saved",
+    "args": "parameters are those of the system, by their names, such as decay(rate=2.0)",
+    "y0": "the state at the start is y=, and v= of second-order systems",
+    "v0": "the velocity at the start is v=",
+    "rtol": "tolerance=1e-6 is relative, tolerance=(rtol, atol) has both parts",
+    "atol": "tolerance=(rtol, atol) has both parts",
+    "first_step": "with tolerance= the first step to try is dt=",
+    "save_every": "each so many steps are saved by every=",
+    "saveat": "with tolerance= the times of saved states are at=, with fixed steps each every=-th is saved",
+    "n_steps": "the number of steps is steps=",
+    "dense_output": "ask for states at more times by at=, or for every step by every=1",
+}
+
+
+@checks.with_hints(HINTS)
 def integrate(
     system: System,
     method: str | Method,
@@ -77,13 +96,13 @@ def integrate(
             tolerance accepted steps of each member count, and ``at`` is one time, the end; rows of ``run.t``, v and y are NaN
             where a member has made fewer steps than another.
         tolerance: in place of ``steps``, for adaptive steps: every member has steps of its own, such that the estimated error of
-            each stays below this. One number is relative: of own equations to the largest that each component has been, so that
-            units do not matter; of built-in systems, whose directions are equivalent, to the largest length of each block. For a
-            component that decays to nothing, or a stiff one, give a tuple (relative, absolute): it allows relative·size +
-            absolute with the present size, as SciPy's rtol and atol, the absolute part in the units of the state. Each is a
-            number, an array over the batch, or one with a number for each component, shape (*block, …) of y, which v has too; a
-            list is refused. For methods with an ``error_order``: merson, fehlberg, fehlberg_5, dop853, taylor, and for stiff
-            equations rosenbrock23, rodas4, rodas5p.
+            each stays below this. One number is relative to the present size: of own equations to that of each component, so that
+            units do not matter; of built-in systems, whose directions are equivalent, to the length of each block. For a
+            component that decays to nothing and never comes back a tuple (relative, absolute) takes fewer steps: it allows
+            relative·size + absolute, as SciPy's rtol and atol, the absolute part in the units of the state. Each is a number, an
+            array over the batch, or one with a number for each component, shape (*block, …) of y, which v has too; a list is
+            refused. For methods with an ``error_order``: merson, fehlberg, fehlberg_5, bs32, dopri5, tsit5, vern7, dop853, vern9,
+            taylor, and for stiff equations rosenbrock23, rodas4, rodas5p.
         at: with a tolerance, the times at which to save the state, from t0 on, ascending, or descending for a run backward in
             time; shape (times,), or (times, *batch) for times of each member. A state within a step is computed by an extra step
             from its start. Steps do not depend on these times, unless the extra step errs by more than is tolerated: the
@@ -93,8 +112,9 @@ def integrate(
         force: what is added to v̇ in every stage, constant over the run, in the units of v per unit of time: for bodies a force
             per mass, that is an acceleration. Shape (*block, *batch) of v, or one number for all. With fixed and adaptive steps;
             in a ``World`` it may change.
-        record: quantities to record of every saved state, ``run.recorded``: "energy", and those that the system names in its
-            ``quantities``; nothing if None. Bodies compute their energy together with the force of the next step, at little cost.
+        record: quantities to record of every saved state, ``run.recorded``: "energy", those that the system names in its
+            ``quantities``, and what a sampled controller sets, as it was held up to there; nothing if None. Bodies compute their
+            energy together with the force of the next step, at little cost.
         events: quantities of a state whose changes of sign are located to the accuracy of the method, ``run.events``: a function
             g(t, v, y), an ``Event``, which may also stop a member, or a list of them. Goes with fixed and adaptive steps in the
             direct form (docs/howto/events.md).
@@ -106,7 +126,7 @@ def integrate(
         dtype: ``"float64"`` or ``"float32"``, half the width and twice the members in a vector: start, parameters and dt are
             rounded to it once, and so is the result of every operation of a step; v and y are returned in it. The bits are the
             same on every machine and with either backend. With a tolerance, of 2⁻²³ = 1.2e-7 or more, time and controller are
-            float64. For steps of up to some 4000 operations, in the direct and the matrix form; not for ``taylor``.
+            float64. For steps of up to some 100 000 operations, in the direct and the matrix form; not for ``taylor``.
         t0: time of step 0, a number, or an array over the batch for a time of each member; ``run.t`` then has shape
             (saved, *batch). Step k is at t0 + k·dt, computed by this formula and never accumulated. With a tolerance, the time of
             the start, likewise.
@@ -168,5 +188,5 @@ def integrate(
     prepared = recent(system, method, options)
     run = noticing(Request.of(system, method, options), is_heard) if prepared is None else prepared.run_of(system, v, y)
     if run.findings:
-        warn_of(run.findings)
+        warn_of(run.findings, 3)
     return run

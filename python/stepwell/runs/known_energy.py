@@ -8,13 +8,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..base import registry
 from ..base.arrays import Array, Shape, Whole
 from ..base.reprs import in_words, share
 from ..errors import AccuracyWarning
 from ..model.methods import Method
-from ..model.systems import Pendulum, RigidBody, System
+from ..model.systems import Pendulum, RigidBody, Springs, System
 from ..reference.acceptance import Acceptance
-from .engine import ABSOLUTE, PACE_NUMBERS, RELATIVE
+from .engine import ABSOLUTE, PACE_NUMBERS, RELATIVE, own_tolerances
 from .result import Run
 
 State = tuple[Array, Array]
@@ -37,6 +38,10 @@ FEW_EVALUATIONS, MOST_NUMBERS = 100, 100_000
 #: Changes below LITTLE of its own size are not checked, which takes a hundred microseconds: they would count only if a constant
 #: of a thousand times what is exchanged was added.
 CHANGED, CHANGED_OF_SLOPE, LITTLE = 0.5, 0.25, 2.0**-10
+#: The share in place of CHANGED of what algebraic equations keep: they have lost the constraint of which they are the derivative.
+DRIFTED = 0.1
+#: The steps of a way on which such an invariant is looked at.
+STEPS = 16
 #: A central difference changes a number by this part of it: a third of its digits.
 PART = 2.0**-17
 #: Changes of an invariant by v and by y cancel up to this share. The error of differences is the square of the part by which an
@@ -71,6 +76,42 @@ def may_pass_barriers(system: System, method: Method, steps: int) -> bool:
     return method.limit != 0.0 and has_barriers and method.evaluations * steps >= FEW_EVALUATIONS
 
 
+def may_gain(system: System, method: Method, steps: int) -> bool:
+    """Whether a run of fixed steps is one of a net, to whose energy nothing but an error adds, long enough to check that."""
+    return isinstance(system, Springs) and system.keeper is None and method.evaluations * steps >= FEW_EVALUATIONS
+
+
+def gain_of(run: Run, start: State) -> About | None:
+    """Members of a run of a net that gained energy in fixed steps; surfaces, damping and drag only take it."""
+    system = run.system
+    v0, y0 = (np.broadcast_to(block, run.y.shape[1:]) for block in start)
+    assert isinstance(system, Springs)
+    if run.force is not None or system.given_inputs() or not run.status.size or v0[system.fixed].any():
+        return None
+    if run.y[-1].size > MOST_NUMBERS:
+        return None
+    saved = slice(-1, None) if run.y.size > MOST_NUMBERS else slice(None)
+    v, y = (np.moveaxis(np.concatenate([a[None], b[saved]]), 0, 2) for a, b in ((v0, run.v), (y0, run.y)))
+    with np.errstate(all="ignore"):
+        alone = system.reference_at_step(1.0, y.shape[2:])
+        _, kinetic, energy = alone.energies(v, y)
+        moved = (y.max(axis=(0, 2)) - y.min(axis=(0, 2))).max(axis=0)
+        weight = np.broadcast_to(alone.masses, (system.n, *alone.masses.shape[1:])).sum(axis=0)
+        pull = 0.0 if alone.fall is None else (weight * np.sqrt((alone.fall * alone.fall).sum(axis=0)))[0]
+        stretched = (0.5 * alone.stiffness * alone.stretches(y[:, :, :1]) ** 2).sum(axis=0)[0]
+        first, most = energy[0], energy.max(axis=0)
+        wrong = (most - first > CHANGED * np.maximum(kinetic.max(axis=0), stretched + pull * moved)) & (run.status == 0)
+    if not wrong.any():
+        return None
+    index, some = tuple(np.argwhere(wrong)[0].tolist()), int(np.count_nonzero(wrong))
+    text = (
+        f"{share(some, wrong.shape, wrong.size)} gained energy, which springs and surfaces never give: "
+        f"{f'{in_words(index)} has ' if wrong.size > 1 else ''}up to {most[index]:.3g} from {first[index]:.3g}, so "
+        f"{run.method.name} with dt = {run.dt:g} did not follow the motion; take shorter steps"
+    )
+    return text, wrong
+
+
 def judged_by_change(system: System, force: Array | None) -> list[str] | None:
     """The invariants by whose change a run of adaptive steps is judged; None if it is judged by more than that.
 
@@ -84,8 +125,8 @@ def judged_by_change(system: System, force: Array | None) -> list[str] | None:
 def doubt_of(run: Run, start: State, visited: Visited | None, heard: Callable[[type[Warning]], bool]) -> About | None:
     """What shows that members did not follow the motion, and which members; None if nothing does.
 
-    With steps of fixed length the method itself makes the energy grow or decay. There only a passed barrier counts, and only
-    with a method that keeps swings bounded.
+    With steps of fixed length the method itself makes the energy grow or decay. There only a passed barrier counts, with a method
+    that keeps swings bounded, and what algebraic equations keep.
 
     Args:
         run: the run.
@@ -108,7 +149,7 @@ def doubt_of(run: Run, start: State, visited: Visited | None, heard: Callable[[t
         for name in names:
             about = _of_one(run, name, start, evaluations, visited)
             # An invariant may be declared only to be recorded, such as the energy of a damped or driven system.
-            if about is not None and (system.kernel != KERNEL_OF_EQUATIONS or _is_constant(run, name)):
+            if about is not None and (system.kernel != KERNEL_OF_EQUATIONS or _is_constant(run, name, start)):
                 return about
     return None
 
@@ -119,14 +160,15 @@ def _has_barriers(system: System) -> bool:
     return isinstance(system, Pendulum) or is_line
 
 
-def _is_constant(run: Run, name: str) -> bool:
-    """Whether an invariant is one: along the rates at the end its changes by v and by y cancel."""
-    system, v, y = run.system, run.v[-1], run.y[-1]
+def _is_constant(run: Run, name: str, start: State) -> bool:
+    """Whether an invariant is one: along the rates at the end its changes by v and by y cancel, or those by each y without v."""
+    system, (v, y), members = run.system, _end(run), run.status.shape
     if system.mass_matrix is not None:
-        return False  # algebraic equations give no rates to go along
-    alone = system.reference_at_step(1.0, run.status.shape)
-    t = np.broadcast_to(run.t[-1], run.status.shape)
+        return _is_constant_at_first(run, name, start)
+    alone, t = system.reference_at_step(1.0, members), np.broadcast_to(run.t[-1], members)
     rates = np.broadcast_to(alone.dv(t, v, y), v.shape), np.broadcast_to(alone.dy(t, v, y), y.shape)
+    if not prod(system.v_shape):
+        return _cancels(system, name, y, rates[1])
     axes = [tuple(range(len(shape))) for shape in (system.v_shape, system.y_shape)]
     sizes = [[np.abs(block).sum(axis=own) for block, own in zip(blocks, axes, strict=True)] for blocks in ((v, y), rates)]
     time = PART * sum(sizes[0]) / sum(sizes[1])
@@ -140,6 +182,32 @@ def _is_constant(run: Run, name: str) -> bool:
     return bool((constant | ~np.isfinite(changes[0] + changes[1])).all())
 
 
+def _cancels(system: System, name: str, y: Array, rates: Array) -> bool:
+    """Whether the changes of an invariant by each number of y, along these rates, cancel."""
+    own = tuple(range(len(system.y_shape)))
+    changes = _slopes(system, name, (np.empty((0, *y.shape[len(own) :])), y))[1] * rates
+    whole = changes.sum(axis=own)
+    return bool(((np.abs(whole) <= CONSTANT * np.abs(changes).sum(axis=own)) | ~np.isfinite(whole)).all())
+
+
+def _is_constant_at_first(run: Run, name: str, start: State) -> bool:
+    """The same for algebraic equations, on a short way from the start, since it may hold only where a constraint does.
+
+    That the length of a rod has no acceleration keeps it only if it has no velocity either, as at the start. At rest nothing
+    changes, so the way is as long as the state takes to change by its size, in ``STEPS`` steps by RK4.
+    """
+    system, y, t, rates = run.system, start[1], run.t0, registry.task("algebraic_rates")
+    own = tuple(range(len(system.y_shape)))
+    begin = rates(system, y, t, 1.0)
+    h = np.abs(y).sum(axis=own) / np.abs(begin).sum(axis=own) / STEPS
+    for _ in range(STEPS):
+        k = [rates(system, y, t, h)]
+        for part in (0.5, 0.5, 1.0):
+            k.append(rates(system, y + part * h * k[-1], t + part * h, h))
+        y, t = y + h / 6.0 * (k[0] + 2.0 * k[1] + 2.0 * k[2] + k[3]), t + h
+    return _cancels(system, name, y, rates(system, y, t, h))
+
+
 def _of_one(run: Run, name: str, start: State, evaluations: int, visited: Visited | None) -> About | None:
     """What one invariant shows. States are evaluated together, since a call takes longer than a thousand numbers."""
     system = run.system
@@ -147,7 +215,8 @@ def _of_one(run: Run, name: str, start: State, evaluations: int, visited: Visite
     few = run.status.size * PLACES <= MOST_NUMBERS // 10
     places = PLACES if few else min(PLACES, MOST_NUMBERS // run.status.size, evaluations // 100)
     has_barriers = _has_barriers(system) and (isinstance(system, Pendulum) or places >= FINER)
-    if not has_barriers and run.paces is None:
+    has_equations = system.mass_matrix is not None
+    if not has_barriers and run.paces is None and not has_equations:
         return None
     region = None if not has_barriers else _saved(run, start) if run.paces is None else _farthest(run)
     first, last, above = _looked_over(run, name, start, region, places)
@@ -159,7 +228,7 @@ def _of_one(run: Run, name: str, start: State, evaluations: int, visited: Visite
             )
             if (about := _of_a_barrier(run, name, first, barrier)) is not None:
                 return about
-    return None if run.paces is None else _of_a_change(run, name, start, (first, last))
+    return None if run.paces is None and not has_equations else _of_a_change(run, name, start, (first, last))
 
 
 def _looked_over(run: Run, name: str, start: State, region: State | None, places: int) -> tuple[Array, Array, Array]:
@@ -209,16 +278,17 @@ def _of_a_change(run: Run, name: str, start: State, values: tuple[Array, Array])
     n = prod(run.system.v_shape) + prod(run.system.y_shape)
     if not wrong.any() or n > MOST_IN_GRADIENT:
         return None
-    to_the_end, at_most = _exchanged(run, name, start, first)
-    by_exchange = ~(change <= CHANGED * at_most)
-    by_size = ~(change <= CHANGED * np.maximum(size, to_the_end))
+    to_the_end, at_most = (0.0, 0.0) if run.paces is None else _exchanged(run, name, start, first)
+    most = CHANGED if run.system.mass_matrix is None else DRIFTED
+    by_exchange = ~(change <= most * at_most)
+    by_size = ~(change <= most * np.maximum(size, to_the_end))
     for state in (start, _end(run)):
         if not (wrong & (by_exchange | by_size)).any():
             return None
         slopes = _slopes(run.system, name, state)
         terms, steepness = _of_terms(run.system, name, state, slopes)
-        wrong &= ~(change <= CHANGED * terms) & ~(change <= _of_a_step(run, slopes))
-        by_size &= ~(change <= CHANGED_OF_SLOPE * steepness)
+        wrong &= ~(change <= most * terms) & ~(change <= _of_a_step(run, slopes))
+        by_size &= ~(change <= CHANGED_OF_SLOPE / CHANGED * most * steepness)
     wrong &= by_exchange | by_size
     if not wrong.any():
         return None
@@ -308,8 +378,12 @@ def _of_terms(system: System, name: str, state: State, slopes: State) -> tuple[A
     The first is what the length of a block, straight down or up, makes of it, or the second where that is less.
 
     That of ½v² is the energy that would be gone at rest. A steep potential is far below its slope times the length. An angular
-    momentum of 0 changes across the motion, and its rounding is nothing beside that.
+    momentum of 0 changes across the motion, and its rounding is nothing beside that. Numbers of one block of a first-order system
+    may have any units, so that there both are the sum of each number times its own slope.
     """
+    if not prod(system.v_shape):
+        each = np.abs(slopes[1] * state[1]).sum(axis=tuple(range(len(system.y_shape))))
+        return each, each
     here, terms, along = _of_several(system, name, [state])[0], np.zeros(()), np.zeros(())
     for which, (block, slope, shape) in enumerate(zip(state, slopes, (system.v_shape, system.y_shape), strict=True)):
         if not prod(shape):
@@ -325,12 +399,13 @@ def _of_terms(system: System, name: str, state: State, slopes: State) -> tuple[A
 
 def _of_a_step(run: Run, slopes: State) -> Array:
     """By how much an invariant may change in a step whose error is just tolerated, or by rounding."""
-    assert run.controller_state is not None
+    if run.controller_state is None:
+        return np.zeros(())
     pace, longest, system = run.controller_state.pace, _longest(run), run.system
     groups = len(longest)
     relative, absolute = pace[RELATIVE], pace[ABSOLUTE]
-    if len(pace) >= PACE_NUMBERS + 3 * groups:  # each group has tolerances of its own
-        relative, absolute = pace[PACE_NUMBERS + groups : PACE_NUMBERS + 2 * groups], pace[PACE_NUMBERS + 2 * groups :][:groups]
+    if len(own := own_tolerances(pace, groups, run.method.has_series * len(_places(system)))):
+        relative, absolute = own[:groups], own[groups:]
     errors = _sizes(run, absolute + np.maximum(relative, ROUNDING) * longest)
     parts = zip(slopes, errors, (system.v_shape, system.y_shape), strict=True)
     return np.asarray(sum((np.abs(slope) * error).sum(axis=tuple(range(len(shape)))) for slope, error, shape in parts))

@@ -1,79 +1,127 @@
-"""Amounts that became negative in a run with adaptive steps, though their equations keep them from it.
+"""Amounts that became negative in a run, though their equations keep them from it.
 
 Where no rate is negative at an amount of 0 while the others are positive, as in reactions and populations, no solution leaves the
-positive ones. A run may: an amount that falls far below the tolerated error has any sign, and a negative one may grow, up to an
+positive ones. A run may: an amount that is smaller than the error of a step has any sign, and a negative one may grow, up to an
 equilibrium that looks like any other.
 """
 
 from __future__ import annotations
 
 from math import prod
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..base.arrays import Array, Whole
+from ..base.arrays import Array, Shape, Whole
+from ..base.immutable import by_value
 from ..base.reprs import first_of, share
 from ..errors import AccuracyWarning
+from ..model.methods import Method
+from ..model.systems import System
 from ..reference import adaptive
 from . import engine
 from .events.members import Members
-from .findings import Finding
+from .findings import Finding, at_places, may_have_amounts
 from .positive import name_of
-from .request import Request
 from .result import Run
 
 #: Errors of many steps add up to so many times the tolerated one of a step, but to no more than this part of a size.
 BEYOND, PART = 100.0, 0.01
+#: Less than this part of the largest size so far, a molecule of a mole, is nothing.
+NOTHING = 2.0**-80
 #: Rates are looked at in so many states, whose numbers are from the first to the second of these parts of the largest one.
 LOOKED_AT, LEAST_PART, MOST_PART = 64, 1e-4, 1e4
 #: Members are looked at so many at a time.
 AT_ONCE = 256
 
 
-def of_negative_amounts(run: Run, request: Request) -> Finding | None:
-    """The finding for members that ended at a negative amount, beyond what is tolerated, which their equations do not reach."""
-    plan, end = request.plan, run.controller_state
-    assert end is not None
-    if prod(plan.system.v_shape) or not plan.system.groups or plan.backward or not (end.y < 0.0).any():
+@by_value
+class Negative(NamedTuple):
+    """Members that ended at a negative amount, beyond what is tolerated, which their equations do not reach.
+
+    Attributes:
+        members: their places in the flattened batch.
+        first: the place of the first of them in the batch.
+        size: where its most negative amount ended, in words.
+        why: why no solution ends there, and what to do.
+    """
+
+    members: Whole
+    first: Shape
+    size: str
+    why: str
+
+    @property
+    def number(self) -> int:
+        """How many members ended so."""
+        return len(self.members)
+
+    def finding(self, shape: Shape) -> Finding:
+        """The finding for a batch of this shape."""
+        size = prod(shape)
+        text = f"{self.size} in {share(self.number, shape, size)}{first_of(self.number, self.first, size)}, {self.why}"
+        return at_places(AccuracyWarning, text, self.members, shape)
+
+
+def of_a_run(run: Run, start: Array, plan: engine.Plan | None = None) -> Negative | None:
+    """The members of a run that began at amounts ``start`` and ended at a negative one; ``plan`` is that of adaptive steps."""
+    end = run.controller_state
+    if end is None or plan is None:
+        return negative(run.system, run.method, (start, run.y[-1]), run.t[-1])
+    if plan.backward or not may_have_amounts(run.system) or not (end.y < 0.0).any():
         return None
-    if plan.system.mass_matrix is not None:  # what algebraic equations give is no rate
+    with np.errstate(all="ignore"):
+        allowed = _allowed(plan, end.pace)
+    return negative(run.system, run.method, (start, end.y), run.t[-1], allowed)
+
+
+def negative(system: System, method: Method, ends: tuple[Array, Array], t: Any, allowed: Array | None = None) -> Negative | None:
+    """The members that ended at a negative amount, beyond what is tolerated, which their equations do not reach, or None.
+
+    Args:
+        system: the system.
+        method: the method.
+        ends: the amounts at the start, and at the end, shape (*block, *batch).
+        t: the time at the end, one for all members or one for each.
+        allowed: how far below zero errors may have led each number of each member; of fixed steps what is lost in rounding.
+    """
+    start, end = ends
+    if not may_have_amounts(system) or not (end < 0.0).any():
         return None
-    if plan.system.reads_time or plan.system.all_inputs():  # rates at one time say nothing of those at another
-        return None
-    n, size = prod(plan.system.y_shape), run.status.size
-    first = np.broadcast_to(request.y, (*plan.system.y_shape, *run.status.shape)).reshape(n, size)
-    last = end.y.reshape(n, size)
-    beyond = last < -_allowed(plan, end.pace)
+    n, batch = prod(system.y_shape), end.shape[len(system.y_shape) :]
+    size = prod(batch)
+    first, last = (np.asarray(np.broadcast_to(each, end.shape), np.float64).reshape(n, size) for each in (start, end))
+    is_fixed = allowed is None
+    if allowed is None:
+        allowed = adaptive.ROUNDING * np.maximum(first.max(axis=0), np.abs(last).max(axis=0))
+    beyond = last < -allowed
     members = np.flatnonzero(beyond.any(axis=0) & (first >= 0.0).all(axis=0))
-    ends = np.broadcast_to(run.t[-1], run.status.shape).reshape(-1)
+    times = np.broadcast_to(t, batch).reshape(-1)
+    plan = engine.Plan(system, method, batch, 1.0)
     some = [members[i : i + AT_ONCE] for i in range(0, members.size, AT_ONCE)]
-    members = members[
-        np.concatenate([*(_stay_positive(plan, each, ends[each], last[:, each]) for each in some), np.empty(0, bool)])
-    ]
+    stay = [_stay_positive(plan, each, times[each], last[:, each]) for each in some]
+    members = members[np.concatenate([*stay, np.empty(0, bool)])]
     if not members.size:
         return None
     one = int(members[0])
     place = int(np.argmin(np.where(beyond[:, one], last[:, one], 0.0)))
-    whole = np.zeros(size, dtype=bool)
-    whole[members] = True
-    whole = whole.reshape(run.status.shape)
-    index = tuple(np.argwhere(whole)[0].tolist())
-    who = f"{share(members.size, whole.shape, size)}{first_of(members.size, index, size)}"
-    text = (
-        f"{name_of(run.system, place)} ends at {last[place, one]:.3g} in {who}, which no solution reaches: no rate of these "
-        f"equations is negative where its number is 0. A number fell far below the tolerated error, which is relative to its "
-        f"largest size so far, and took the wrong sign; give positive=True"
+    instead = "a shorter step" if is_fixed else "a smaller tolerance, or give positive=True"
+    why = (
+        f"which no solution reaches: no rate of these equations is negative where its number is 0. An error of the steps gave it "
+        f"the wrong sign; take {instead}"
     )
-    return Finding(AccuracyWarning, text, whole)
+    index = tuple(int(i) for i in np.unravel_index(one, batch)) if batch else ()
+    return Negative(members, index, f"{name_of(system, place)} ends at {last[place, one]:.3g}", why)
 
 
 def _allowed(plan: engine.Plan, pace: Array) -> Array:
-    """How far below zero errors may have led each number of each member, by the largest sizes so far."""
+    """How far below zero errors may have led each number of each member: by what is tolerated of a number that is zero."""
     numbers = engine.pace_of(plan, pace)
     n = prod(plan.system.y_shape)
     count = sum(plan.acceptance.counts(0, n))
-    _, tolerated = adaptive.tolerated(numbers, numbers.h, (0, count), numbers.longest, numbers.longest, adaptive.ROUNDING)
+    zero = np.zeros_like(numbers.longest)
+    _, tolerated = adaptive.tolerated(numbers, numbers.h, (0, count), zero, zero, adaptive.ROUNDING)
+    tolerated = np.maximum(np.maximum(tolerated, adaptive.rounded(numbers, numbers.h)), NOTHING * numbers.longest)
     allowed = np.maximum(tolerated, np.minimum(BEYOND * tolerated, PART * numbers.longest))
     return np.asarray(allowed).reshape(count, plan.members)[list(plan.acceptance.groups)]
 

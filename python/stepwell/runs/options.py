@@ -170,7 +170,7 @@ def quantities(system: System, record: Any) -> list[str]:
     if record is None or (type(record) is tuple and not record):
         return []
     names = [record] if isinstance(record, str) else checks.several("record", record, "quantities")
-    known = list(dict.fromkeys(["energy", *system.quantities]))
+    known = list(dict.fromkeys(["energy", *system.recorded_shapes()]))
     for name in names:
         checks.known("record", name, known)
     if "energy" in names and "energy" not in system.quantities:

@@ -15,7 +15,7 @@ from ..model.methods import Method
 from ..model.systems import NBody, System
 from . import engine
 from .diagnostics import findings_of, finds_growth_only
-from .findings import is_heard, warn_of
+from .findings import is_heard, may_have_amounts, warn_of
 from .fixed import fixed_run
 from .making import noticing
 from .options import Options, block_like, spread
@@ -145,7 +145,9 @@ def _own(name: str, option: Any) -> Any:
     """An option that does not change any more."""
     if isinstance(option, np.ndarray):
         return frozen(name, option)
-    return option.copy() if isinstance(option, list) else option
+    if type(option) in (list, tuple):
+        return type(option)(frozen(name, each) if isinstance(each, np.ndarray) else each for each in option)
+    return option
 
 
 class _ShortRun:
@@ -162,6 +164,7 @@ class _ShortRun:
         self.shape_of_carry = None if run.carry is None else run.carry.shape
         self.dtype = plan.dtype
         self.is_plain = finds_growth_only(request.system, plan.method, plan.steps)
+        self.has_amounts = may_have_amounts(request.system)
 
     def run(self, v: Any, y: Any) -> Run | None:
         """The run from this start; None if it is to be made as any other."""
@@ -178,7 +181,7 @@ class _ShortRun:
             t=self.t.copy(), v=saved_v, y=saved_y, status=self.status.copy(), first_bad_step=self.first_bad.copy(), carry=carry,
             recorded={}, events={},
         )  # fmt: skip
-        if outcome != TAME or not self.is_plain:
+        if outcome != TAME or not self.is_plain or (self.has_amounts and (saved_y[-1] < 0.0).any()):
             request = self.request
             request = request._replace(v=block_like(v, request.v), y=block_like(y, request.y))
             if findings := findings_of(run, request, is_heard):

@@ -53,12 +53,17 @@ class _Numbers(NamedTuple):
 _PLAIN = frozenset({type(None), bool, int, float, str, np.float64, _Numbers})
 
 
+def _signed(option: Any) -> Any:
+    """An option; zeros have signs, but are equal."""
+    return option.hex() if isinstance(option, float) and option == 0.0 else option
+
+
 def _numbers(option: Any) -> Any:
     """An option as its numbers, if it is a short list, tuple or array of them; else itself."""
     kind = type(option)
     if (kind is list or kind is tuple) and len(option) <= MOST_NUMBERS:
         types = tuple(map(type, option))
-        return _Numbers(kind, types, tuple(option)) if _PLAIN.issuperset(types) else option
+        return _Numbers(kind, types, tuple(map(_signed, option))) if _PLAIN.issuperset(types) else option
     if kind is np.ndarray and option.size <= MOST_NUMBERS and option.dtype == np.float64:
         return _Numbers(kind, option.shape, option.tobytes())
     return option
@@ -113,7 +118,7 @@ def recent(system: System, method: str | Method, options: Options) -> PreparedRu
 
     It is prepared at the second time, since most runs are made once.
     """
-    others = *options[2:5], _numbers(options.tolerance), _numbers(options.at), *options[7:]
+    others = tuple(map(_signed, (*options[2:5], _numbers(options.tolerance), _numbers(options.at), *options[7:])))
     kinds = tuple(map(type, others))
     if not _PLAIN.issuperset(kinds) or not isinstance(system, System) or _core.names_device():
         return None

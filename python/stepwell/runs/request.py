@@ -16,6 +16,7 @@ from ..base import checks
 from ..base.arrays import Array, Shape, Whole
 from ..errors import ArgumentError, ShapeError, UnsupportedError
 from ..model.compatibility import (
+    bounces_within_limits,
     fits_own_times,
     fits_together,
     forced,
@@ -202,9 +203,11 @@ class Request(NamedTuple):
             system, method, batch, dt, t0, start_step, steps, every, choice, workers, backend, form, fused=fused, single=single,
             device=machine,
         )  # fmt: skip
-        # In float32, in the matrix forms and with events quantities are computed from the saved states.
-        while_stepping = tuple(record) if form == "direct" and not single and watched is None else ()
-        recorded = sum(prod(system.quantities[name]) for name in record)
+        # In float32, in the matrix forms and with events quantities are computed from the saved states, which do not tell what a
+        # controller has put out.
+        shapes, later = system.recorded_shapes(), form != "direct" or single or watched is not None
+        while_stepping = tuple(name for name in record if not later or name not in system.quantities)
+        recorded = sum(prod(shapes[name]) for name in record)
         checks.fits(
             "the saved states",
             plan.save_count * (rows + recorded) + NUMBERS_PER_STATE * (rows + 1),
@@ -224,6 +227,7 @@ class Request(NamedTuple):
             check_algebraic(system, y, t0)
         system = system.stepped_by(method)
         samples_meet_steps(system, method, t0, dt)
+        bounces_within_limits(system, method, dt)
         stepped = system.over_steps(method, checks.once_of(t0) if isinstance(t0, np.ndarray) else t0, dt)
         carried = False
         if before is not None and before.carry is not None and (carried := before.holds(system, batch, v, y)):
@@ -260,8 +264,8 @@ class Request(NamedTuple):
 
             float32.check(system, method)
         t0 = checks.numbers("t0", 0.0 if options.t0 is None else options.t0, unit="units of time")
-        times = checks.numbers("at", options.at, unit="units of time")
-        if times.ndim == 0 or times.size == 0:
+        times = np.atleast_1d(checks.numbers("at", options.at, unit="units of time"))
+        if times.size == 0:
             raise ShapeError(f"at: expected times along the first axis, got shape {times.shape}")
         v = checks.block("v", v, system.v_shape, system.axes)
         y = checks.block("y", options.y, system.y_shape, system.axes)
@@ -279,13 +283,15 @@ class Request(NamedTuple):
         backend = checks.known("backend", options.backend, BACKENDS)
         budget = MOST_STEPS if options.max_steps is None else checks.count("max_steps", options.max_steps, 1)
         machine = machine_of(options.device, backend)
-        acceptance = Acceptance(system.groups, positive=positive.checked_places(system, options.positive, v, y))
+        places = positive.checked_places(system, options.positive, v, y)
+        acceptance = Acceptance(system.groups, positive=places, compensated=method.has_series)
         numbers = prod(system.v_shape) + prod(system.y_shape)
+        low = method.has_series * numbers
         groups = sum(acceptance.counts(prod(system.v_shape), prod(system.y_shape)))
         pace = None
         if before is not None:
-            pace = adaptive_options.pace_of(before, method, groups)
-            acceptance = acceptance._replace(own=len(pace) == engine.PACE_NUMBERS + 3 * groups)
+            pace = adaptive_options.pace_of(before, method, groups, low)
+            acceptance = acceptance._replace(own=len(engine.own_tolerances(pace, groups, low)) > 0)
         first = most_step = None
         if pace is not None:
             if options.dt is not None:
@@ -368,7 +374,7 @@ class Request(NamedTuple):
         if control is not None:
             system = system.controlled(control, v, y, TINY)
         relative = (
-            tolerances.relative if tolerances is not None else adaptive_options.relative_tolerances(pace, acceptance, groups)
+            tolerances.relative if tolerances is not None else adaptive_options.relative_tolerances(pace, acceptance, groups, low)
         )
         order = order_of_series(method, relative.min(axis=0) if acceptance.own else relative)
         begin: Any = sign * t0 if t0.ndim else float(sign * t0)
@@ -382,7 +388,7 @@ class Request(NamedTuple):
         standing = (sign * t0 if pace is None else continuation.standing(pace)), v, y
         if before is None:
             assert tolerances is not None
-            paces = engine.paces(plan, first, tolerances, most_step, pacing)
+            paces = engine.paces(plan, first, tolerances if single else tolerances.of_steps(method), most_step, pacing)
         else:
             paces, v, y, begins = continuation.taken_up(plan, pacing, before, v, y)
             pacing = pacing._replace(begins=begins)
@@ -456,6 +462,7 @@ class Request(NamedTuple):
         stepped.check_time(abs(t0) + first * abs(dt))
         not_with_exact(method, force=force, events=events, control=control)
         samples_meet_steps(stepped, method, t0, dt)
+        bounces_within_limits(stepped, method, dt)
         if before is None and first == 0:
             check_algebraic(stepped, y, t0)
         seen = stepped.over_steps(method, t0, dt)

@@ -13,7 +13,7 @@ from ..base import checks, registry
 from ..base.arrays import Array, Whole
 from ..base.immutable import ValueEquality, by_value
 from ..base.reprs import MAX_LINE, counted, facts, shortened
-from ..errors import UnsupportedError
+from ..errors import ArgumentError, UnsupportedError
 from ..model.methods import Method
 from ..model.systems import System
 from .encounters import Collision, Encounter
@@ -208,6 +208,9 @@ class Run(ValueEquality):
 
         Without the last state it is not one from which another run goes on.
 
+        Raises:
+            ArgumentError: if there is no such saved state.
+
         Args:
             saved: which, by an index of the first axis: a number, which leaves that axis, a slice, numbers or truths.
 
@@ -220,7 +223,14 @@ class Run(ValueEquality):
             >>> run.select(-1).y.shape
             (1,)
         """
-        places = np.atleast_1d(np.arange(len(self.t))[saved])
+        if saved is None:  # which NumPy takes for another axis
+            raise ArgumentError("saved: expected an index of the saved states, got None")
+        try:
+            places = np.atleast_1d(np.arange(len(self.t))[saved])
+        except IndexError as error:
+            raise ArgumentError(
+                f"saved: expected an index of the {len(self.t)} saved states, got {checks.short(saved)} ({error})"
+            ) from None
         part = copy.copy(self)
         part.t, part.v, part.y = self.t[places], self.v[places], self.y[places]
         part.recorded = {name: values[places] for name, values in self.recorded.items()}

@@ -88,6 +88,8 @@ def why_stopped(run: Run, index: Shape, why_short: Callable[[Shape], str]) -> st
             f"{WHY_STOPPED[status]}, whose roundings there are {spacing:.2g}: count times from a nearer origin, "
             f"or give a larger tolerance"
         )
+    if jump := why_short(index):
+        return f"{WHY_STOPPED[status]}{jump}"
     return f"{WHY_STOPPED[status]}: {BLOWS_UP}; {_largest_rate(run, index)}"
 
 

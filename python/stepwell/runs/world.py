@@ -29,6 +29,10 @@ from .result import Run
 if TYPE_CHECKING:
     from .occurrences import Occurrences
 
+#: By this share of each number algebraic equations may be off in a state that was written, where those of other members are as
+#: the steps left them.
+MOST_WRITTEN = 1e-3
+
 
 class World:
     """A loop over the user's own arrays: everything is checked and prepared once, then ``step`` works in place.
@@ -68,9 +72,10 @@ class World:
     one happens. The carry of Verlet and leapfrog is kept inside; if you change ``v`` or ``y`` between steps, the method starts
     again from the new values. Ctrl-C leaves the world at the last complete step, or at the one before (leapfrog of many bodies,
     whose velocity there would take long to compute).
-    A world does not check for divergence: use ``numpy.isfinite`` on your arrays. It checks their size now and then after its
-    first steps, and warns once if they grew a million times by steps that are beyond the stability limit. Arrays of another
-    library are stepped in place, too, where NumPy may write to them (DLPack); ``v`` and ``y`` are then NumPy's views of them.
+    A world warns once if its state is not finite after a call of ``step``, or within eight steps where it has more than 256
+    numbers. It checks their size now and then after its first steps, and warns once if they grew a million times by steps that
+    are beyond the stability limit. Arrays of another library are stepped in place, too, where NumPy may write to them (DLPack);
+    ``v`` and ``y`` are then NumPy's views of them.
 
     Method, step and the operations of the system are fixed; ``World(system, method, resume=world)`` makes another world that
     continues from here. The numbers of the system live: ``set`` and ``parameters`` change them between steps, and ``reset`` gives
@@ -78,7 +83,9 @@ class World:
     ``copy.copy``, ``copy.deepcopy`` and ``pickle`` make an equal world with arrays of its own.
 
     Warns:
-        AccuracyWarning: once, if the state grew a million times by steps beyond the stability limit.
+        DivergenceWarning: once, if the state is no longer finite.
+        AccuracyWarning: once, if the state grew a million times by steps beyond the stability limit, or if an amount became
+            negative, which its equations do not reach.
 
     Example:
         >>> v, y = np.zeros(3), np.ones(3)
@@ -127,23 +134,39 @@ class World:
         self._live: dict[str, Live] = {}
         #: The control as it was given, without a target of its own: members that are reset aim at that of their new state.
         self._control = control if getattr(control, "target", self) is None else None
-        make: Callable[..., None] = loop.step
+        make: Callable[..., bool] = loop.step
         if request.events is not None:
             from .events import frames  # only such worlds need it
 
             self._frames = frames.Frames(plan, request.events, v, y, loop)
             make = self._frames.step
         # A state that an event changed says nothing about the growth by steps.
-        if not any(each.then for each in request.events or ()):
-            make = registry.task("watched_for_growth")(make, loop, request.system, plan.method, plan.dt, v, y)
+        grows = not any(each.then for each in request.events or ())
+        if request.system.mass_matrix is not None:
+            make = self._holding(make, y)
         #: ``step(n=1)`` makes n steps in place.
-        object.__setattr__(self, "step", make)
+        step = registry.task("watched")(make, loop, request.system, plan.method, plan.dt, v, y, grows)
+        object.__setattr__(self, "step", step)
         if request.system.keeper is not None:
             from .diagnostics import of_a_strong_control
 
             warn_of(of_a_strong_control(request.system, v, y, plan.dt))
 
     step: Any
+
+    def _holding(self, make: Callable[..., bool], y: Array) -> Callable[..., bool]:
+        """``make`` for a system with algebraic equations, which have to hold in a state that was written between its calls."""
+        left = y.copy()
+
+        def step(n: int = 1) -> bool:
+            """Make n steps in place, and return whether the state is no longer finite."""
+            if not np.array_equal(left, y, equal_nan=True):
+                registry.task("algebraic_start")(self.system, y, self.t, MOST_WRITTEN, 0.0)
+            diverged = make(n)
+            left[...] = y
+            return diverged
+
+        return step
 
     def __setattr__(self, name: str, value: object) -> None:
         if not name.startswith("_"):

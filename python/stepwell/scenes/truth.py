@@ -21,7 +21,7 @@ TIGHT_TOLERANCE, CHECK_TOLERANCE, LOOSER = 1e-14, 1e-13, (1e2, 1e4)
 #: The method of the reference solution, and that where the equations are stiff: where of two runs to a loose tolerance the first
 #: takes MANY attempts, and more than STIFF times those of the second. To a tight tolerance the second, of a lower order, takes
 #: some STIFF times as many; the first takes as many to any tolerance where stability holds down its steps.
-METHOD, METHOD_IF_STIFF, LOOSE_TOLERANCE, MANY, STIFF = "dop853", "rodas5p", 1e-6, 5_000, 20.0
+METHOD, METHOD_IF_STIFF, LOOSE_TOLERANCE, MANY, STIFF = "dop853", "rodas5p", 1e-6, 5_000, 10.0
 
 #: The most numbers of a state for which the second is tried: it solves equations in each step.
 MOST_STIFF_NUMBERS = 256

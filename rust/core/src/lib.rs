@@ -11,11 +11,13 @@
 //! * [`step`]: a model and a method become tapes.
 //! * [`group`]: members stepped together.
 //! * [`large`]: systems whose step is too long for a tape.
+//! * [`events`]: changes of sign of quantities between the states of steps.
 //! * [`run`]: the driver divides a batch among groups and threads, saves states and finds members that diverged.
 
 pub use stepwell_base::{aligned, bodies, functions, isa};
 
 pub mod error;
+pub mod events;
 pub mod group;
 pub mod kernel;
 pub mod large;

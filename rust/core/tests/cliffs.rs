@@ -4,6 +4,8 @@
 #![allow(clippy::unwrap_used, reason = "a test that fails may panic")]
 
 mod common;
+#[path = "common/ring.rs"]
+mod ring;
 
 use std::sync::Arc;
 
@@ -343,6 +345,30 @@ fn what_all_members_have_in_common_is_in_no_loop() {
         let (free, driven) = (of(false), of(true));
         let evaluations = stepwell_core::model::methods::method(method).unwrap().program().evaluations();
         assert!(driven - free <= nodes + evaluations, "{method}: {driven} against {free}");
+    }
+}
+
+/// So it takes no longer either, but for what the caches do. A mass on the ring is eight operations. Number by number and in vectors
+/// of one member's numbers, and over many members: at most so many instructions and spills for ten operations, and a tenth more than
+/// in a shorter step.
+#[test]
+fn a_longer_step_has_no_more_instructions_for_an_operation() {
+    for level in levels() {
+        for (members, packs, most) in [(1, false, [15, 1]), (1, true, [9, 5]), (UNLIMITED, false, [15, 1])] {
+            let mut before = [f64::INFINITY; 2];
+            for n in [100, 300, 1000, 3000, 10_000] {
+                let body = ring::ring(n);
+                let shape = choose(&body, level, members).unwrap();
+                let kernel = if packs { write_if_it_gains(&body, shape) } else { write(&body, shape) }.unwrap();
+                let (turn, work) = (turn(&kernel), (body.work() * shape.block_vectors) as f64);
+                let each = [turn.all, turn.spilled].map(|count| 10.0 * count as f64 / work);
+                let about = format!("{level:?}, {members} members, packed: {packs}, {n} masses: {each:?} for ten operations");
+                for ((now, before), most) in each.iter().zip(before).zip(most) {
+                    assert!(*now <= f64::from(most) && *now <= 1.1 * before + 0.3, "{about}, at most {most}, before {before}");
+                }
+                before = each;
+            }
+        }
     }
 }
 

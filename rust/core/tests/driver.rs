@@ -44,6 +44,7 @@ fn plan(model: Model<'_>, h: f64, steps: i64, members: usize, threads: usize) ->
         members,
         carried: false,
         own: members,
+        events: None,
     }
 }
 

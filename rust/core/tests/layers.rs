@@ -10,7 +10,7 @@ use std::{
 };
 
 /// The layers, bottom up. docs/developing/design.md tells what is in each.
-const LAYERS: [&str; 9] = ["error", "tape", "kernel", "model", "stage", "step", "group", "large", "run"];
+const LAYERS: [&str; 10] = ["error", "tape", "kernel", "model", "stage", "step", "group", "large", "events", "run"];
 
 /// The names of a module and those around it, from the root of the crate.
 type Module = Vec<String>;

@@ -1,5 +1,6 @@
 //! The Python binding: arrays in, arrays out, the GIL released, errors mapped. No arithmetic and no decisions here.
 
+mod events;
 mod methods;
 mod model;
 mod prepared;
@@ -16,6 +17,7 @@ use numpy::{
 use pyo3::{exceptions::PyKeyboardInterrupt, prelude::*, types::PyDict};
 use stepwell_core::{
     error::Error,
+    events::motion::Events,
     isa::Level,
     model::systems as kinds,
     run::{
@@ -109,9 +111,24 @@ struct ArraysOf<'py, T: Element + 'py> {
 #[pyfunction]
 fn run(py: Python<'_>, model: &ModelSpec, plan: PlanOf, arrays: Bound<'_, PyAny>) -> PyResult<bool> {
     match model.precision {
-        Precision::Double => run_with::<f64>(py, model, plan, arrays.extract()?),
-        Precision::Single => run_with::<f32>(py, model, plan, arrays.extract()?),
+        Precision::Double => run_with::<f64>(py, model, plan, arrays.extract()?, None),
+        Precision::Single => run_with::<f32>(py, model, plan, arrays.extract()?, None),
     }
+}
+
+/// The same with events: returns what was found of them, too.
+#[pyfunction]
+fn run_and_look(
+    py: Python<'_>,
+    model: &ModelSpec,
+    plan: PlanOf,
+    arrays: Bound<'_, PyAny>,
+    events: events::EventsOf<'_>,
+) -> PyResult<(bool, events::AllFound)> {
+    let arrays: ArraysOf<'_, f64> = arrays.extract()?;
+    let events = events.of_core(arrays.first_bad.as_array().len())?;
+    let diverged = run_with::<f64>(py, model, plan, arrays, Some(&events))?;
+    Ok((diverged, events::found(py, &events)))
 }
 
 fn run_with<T: Steppable + Element>(
@@ -119,6 +136,7 @@ fn run_with<T: Steppable + Element>(
     model: &ModelSpec,
     plan: PlanOf,
     mut arrays: ArraysOf<'_, T>,
+    events: Option<&Events>,
 ) -> PyResult<bool> {
     let (rows, tables) = (model.rows(py)?, model.tables(py)?);
     let (v, y) = (readable(&arrays.v)?, readable(&arrays.y)?);
@@ -133,6 +151,7 @@ fn run_with<T: Steppable + Element>(
         y: by_row(&y)?,
         members: arrays.first_bad.as_array().len(),
         own: arrays.first_bad.as_array().len(),
+        events,
         carried: arrays.carried,
     };
     let to_fill = Arrays {
@@ -173,6 +192,7 @@ fn recorded(
         members,
         carried: false,
         own,
+        events: None,
     };
     let to_fill = Arrays {
         saved_v: &mut [],
@@ -246,7 +266,33 @@ struct AdaptiveArraysOf<'py> {
 /// Makes a run of adaptive steps from the rows of `v` and `y`, and fills what is kept at the times of the pacing. Returns whether
 /// it did: see `adaptive::run`.
 #[pyfunction]
-fn adapt(py: Python<'_>, model: &ModelSpec, plan: PlanOf, pacing: PacingOf, mut arrays: AdaptiveArraysOf<'_>) -> PyResult<bool> {
+fn adapt(py: Python<'_>, model: &ModelSpec, plan: PlanOf, pacing: PacingOf, arrays: AdaptiveArraysOf<'_>) -> PyResult<bool> {
+    adapt_with(py, model, plan, pacing, arrays, None)
+}
+
+/// The same with events: returns what was found of them, too.
+#[pyfunction]
+fn adapt_and_look(
+    py: Python<'_>,
+    model: &ModelSpec,
+    plan: PlanOf,
+    pacing: PacingOf,
+    arrays: AdaptiveArraysOf<'_>,
+    events: events::EventsOf<'_>,
+) -> PyResult<(bool, events::AllFound)> {
+    let events = events.of_core(arrays.status.as_array().len())?;
+    let made = adapt_with(py, model, plan, pacing, arrays, Some(&events))?;
+    Ok((made, events::found(py, &events)))
+}
+
+fn adapt_with(
+    py: Python<'_>,
+    model: &ModelSpec,
+    plan: PlanOf,
+    pacing: PacingOf,
+    mut arrays: AdaptiveArraysOf<'_>,
+    events: Option<&Events>,
+) -> PyResult<bool> {
     let (rows, tables) = (model.rows(py)?, model.tables(py)?);
     let (v, y) = (readable(&arrays.v)?, readable(&arrays.y)?);
     let run = adaptive::AdaptiveRun {
@@ -261,6 +307,7 @@ fn adapt(py: Python<'_>, model: &ModelSpec, plan: PlanOf, pacing: PacingOf, mut 
         v: by_row(&v)?,
         y: by_row(&y)?,
         members: arrays.status.as_array().len(),
+        events,
     };
     let (steps, kept_steps): ([&mut [f64]; 3], &mut [i64]) = match &mut arrays.steps {
         Some(KeptStepsOf { counts, t, v, y }) => {
@@ -521,8 +568,10 @@ fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_function(wrap_pyfunction!(ask, m)?)?;
     m.add_function(wrap_pyfunction!(listen, m)?)?;
     m.add_function(wrap_pyfunction!(run, m)?)?;
+    m.add_function(wrap_pyfunction!(run_and_look, m)?)?;
     m.add_function(wrap_pyfunction!(recorded, m)?)?;
     m.add_function(wrap_pyfunction!(adapt, m)?)?;
+    m.add_function(wrap_pyfunction!(adapt_and_look, m)?)?;
     m.add_function(wrap_pyfunction!(times, m)?)?;
     m.add_function(wrap_pyfunction!(check, m)?)?;
     m.add_function(wrap_pyfunction!(compiled, m)?)?;
@@ -538,6 +587,7 @@ fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_class::<model::Equations>()?;
     m.add_class::<tape::Tape>()?;
     m.add_class::<tape::Symbol>()?;
+    m.add_class::<tape::Evaluation>()?;
     m.add_function(wrap_pyfunction!(prepared::prepared, m)?)?;
     m.add_class::<prepared::Prepared>()?;
     m.add_function(wrap_pyfunction!(prepared_adaptive::prepared_adaptive, m)?)?;

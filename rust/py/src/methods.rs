@@ -73,6 +73,9 @@ pub(crate) fn program(method: &str, attempts: bool, stage: &str, choice: usize) 
             Entry::Kick(t, ..) => ("kick", t.node()),
             Entry::DriftV(share, ..) => ("drift of v", share),
             Entry::DriftY(share, ..) => ("drift of y", share),
+            Entry::SquareV(..) => ("square for v", 0.0),
+            Entry::SquareY(..) => ("square for y", 0.0),
+            Entry::IfAtMost(_) => ("if at most", 0.0),
             Entry::Kept(i, of_v) => (if of_v { "kept v" } else { "kept y" }, f64::from(i)),
         };
         (name, entry.operands().into_iter().map(|block| block.index()).collect(), number)

@@ -189,7 +189,7 @@ impl ModelSpec {
         fused: bool,
         order: u32,
         single: bool,
-        acceptance: Option<(Vec<u32>, bool, Vec<u32>)>,
+        acceptance: Option<(Vec<u32>, bool, Vec<u32>, bool)>,
         backward: bool,
     ) -> Self {
         let mut names = Signature { system, ..Signature::default() };
@@ -221,8 +221,12 @@ impl ModelSpec {
             (None, None) => StepKind::Method { name: method, choice: 0 },
             (Some((nodes, _)), _) => StepKind::Matrix { nodes: nodes.into_iter().map(f64::to_bits).collect(), fused },
         };
-        let acceptance =
-            acceptance.map_or_else(Acceptance::default, |(groups, own, positive)| Acceptance { groups, own, positive });
+        let acceptance = acceptance.map_or_else(Acceptance::default, |(groups, own, positive, compensated)| Acceptance {
+            groups,
+            own,
+            positive,
+            compensated,
+        });
         ModelSpec {
             signature: Arc::new(names),
             how,

@@ -97,6 +97,7 @@ impl Input {
             v: self.v.rows(),
             y: self.y.rows(),
             members: self.members,
+            events: None,
         }
     }
 }

@@ -1,7 +1,11 @@
 //! Tapes in Python: with symbols in place of numbers the reference's step is traced, to be compared with the core's.
 
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::{
+    slice,
+    sync::{Arc, Mutex, MutexGuard, PoisonError},
+};
 
+use numpy::{PyArray2, PyArrayMethods, PyReadonlyArray1};
 use pyo3::{
     exceptions::{PyIndexError, PyTypeError, PyValueError},
     prelude::*,
@@ -9,10 +13,12 @@ use pyo3::{
     types::{PyDict, PyFloat, PyInt},
 };
 use stepwell_core::{
+    events::evaluation,
+    model::spec::Row,
     step::trace,
     tape::{
         self, Id, OPERATIONS, Op,
-        equations::{self, Friction, Invariant, On},
+        equations::{self, Friction, Invariant, Marked, On},
         fuse::fuse,
         mass::Mass,
         print,
@@ -23,7 +29,8 @@ use stepwell_core::{
 
 use crate::{
     kinds_of,
-    model::{Equations, ModelSpec, core_error, precision},
+    model::{Equations, ModelSpec, argument_error, core_error, precision},
+    world::machine,
 };
 
 /// Of each operation its name, how many operands it has, among which counts it is, and whether these may be exchanged.
@@ -68,8 +75,8 @@ type Kept<'py> = (PyRef<'py, Symbol>, Vec<PyRef<'py, Symbol>>, Vec<PyRef<'py, Sy
 /// others change with it.
 type Sticking<'py> = (Vec<PyRef<'py, Symbol>>, usize, Option<(usize, Vec<PyRef<'py, Symbol>>)>);
 
-/// A value that is a function of others: with each of these its derivative by it.
-type Function<'py> = (PyRef<'py, Symbol>, Vec<(PyRef<'py, Symbol>, PyRef<'py, Symbol>)>, Option<[f64; 2]>);
+/// A value that is a function of others: with each of these its derivative by it, its bounds, and whether it is made of pieces.
+type Function<'py> = (PyRef<'py, Symbol>, Vec<(PyRef<'py, Symbol>, PyRef<'py, Symbol>)>, Option<[f64; 2]>, bool);
 
 /// A symbol, or a number that becomes one.
 enum Value<'py> {
@@ -265,6 +272,53 @@ impl Symbol {
     }
 }
 
+/// Values of a tape for many members at once.
+#[pyclass(module = "stepwell._core", frozen)]
+pub struct Evaluation(pub(crate) evaluation::Evaluation);
+
+/// One number for all members, or one for each.
+#[derive(FromPyObject)]
+enum Numbers<'py> {
+    Common(f64),
+    Own(PyReadonlyArray1<'py, f64>),
+}
+
+impl Numbers<'_> {
+    fn slice(&self) -> PyResult<&[f64]> {
+        match self {
+            Numbers::Common(number) => Ok(slice::from_ref(number)),
+            Numbers::Own(numbers) => Ok(numbers.as_slice()?),
+        }
+    }
+}
+
+#[pymethods]
+impl Evaluation {
+    /// A row for each value, from rows of the state and of the parameters.
+    fn __call__<'py>(
+        &self,
+        py: Python<'py>,
+        members: usize,
+        state: Vec<Numbers<'_>>,
+        parameters: Vec<Numbers<'_>>,
+    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let state = state.iter().map(|each| Ok(Row(each.slice()?))).collect::<PyResult<Vec<Row>>>()?;
+        let parameters = parameters.iter().map(|each| Ok(Row(each.slice()?))).collect::<PyResult<Vec<Row>>>()?;
+        for row in state.iter().chain(&parameters) {
+            if row.0.len() != 1 && row.0.len() != members {
+                return Err(argument_error(format!("expected one number or {members}, got {}", row.0.len())));
+            }
+        }
+        let values = PyArray2::zeros(py, [self.0.values(), members], false);
+        let level = machine()?.level;
+        if members > 0 {
+            let mut out = values.readwrite();
+            self.0.run(level, (&state, &parameters), members, out.as_slice_mut()?);
+        }
+        Ok(values)
+    }
+}
+
 #[pymethods]
 impl Tape {
     /// For numbers of 64 bits, or of 32.
@@ -398,9 +452,9 @@ impl Tape {
             Ok(Invariant { value: known(&value)?, along_v: all(&along_v)?, along_y: all(&along_y)?, square: known(&square)? })
         });
         let made = equations::Equations::new(tape.ops().to_vec(), dv, dy, quantities, kept.transpose()?);
-        let functions = functions.into_iter().map(|(value, by, bounds)| {
+        let functions = functions.into_iter().map(|(value, by, bounds, pieces)| {
             let by = by.iter().map(|(of, factor)| Ok((known(of)?, known(factor)?))).collect::<PyResult<Vec<_>>>()?;
-            Ok((known(&value)?, by, bounds.map(|bounds| bounds.map(f64::to_bits))))
+            Ok(Marked { value: known(&value)?, by, bounds: bounds.map(|bounds| bounds.map(f64::to_bits)), pieces })
         });
         let made = made.with_functions(functions.collect::<PyResult<Vec<_>>>()?);
         let friction = friction.map(|(limit, length, one)| -> PyResult<Friction> {
@@ -421,6 +475,13 @@ impl Tape {
         let fused = Shared::new(Mutex::new(fused));
         let symbols = roots.into_iter().map(|id| Symbol { tape: Arc::clone(&fused), id }).collect();
         Ok((Tape(fused), symbols))
+    }
+
+    /// These values for many members at once, from so many numbers of a state and from parameters; None if they depend on a step,
+    /// a time or a sampled input.
+    fn evaluation(&self, of: Vec<PyRef<'_, Symbol>>, states: usize) -> PyResult<Option<Evaluation>> {
+        let (tape, roots) = self.with(&of)?;
+        Ok(evaluation::Evaluation::new(&tape, &roots, states).map_err(core_error)?.map(Evaluation))
     }
 
     /// How often each kind of operation was asked for in a step, if these values are its next state.

@@ -190,6 +190,8 @@ const COPIED_NUMBERS: usize = 256;
 /// Other threads of Python go on meanwhile, unless a call is shorter than this part of the time between two checks: then to let
 /// them would take longer than the call.
 const CALL_IS_SHORT: i64 = 64;
+/// Arrays of more numbers are checked once in so many steps for whether they are finite.
+const STEPS_PER_CHECK: i64 = 8;
 /// Steps above this are no longer exact as floating-point numbers.
 const LAST_STEP: i64 = 1 << 53;
 
@@ -219,6 +221,8 @@ struct Loop<T: Of> {
     arrays: Arrays<T>,
     force: Option<ForceArray<T>>,
     live: Option<Live>,
+    /// Steps since it was last checked whether the state is finite.
+    unchecked: i64,
 }
 
 impl<T: Of> Loop<T> {
@@ -247,12 +251,18 @@ impl<T: Of> Loop<T> {
         } else {
             Arrays::Many { v, y }
         };
-        Ok(Loop { world, arrays, force, live: None })
+        Ok(Loop { world, arrays, force, live: None, unchecked: 0 })
     }
 
-    /// `n` steps; long calls let other threads run and check for Ctrl-C.
-    fn advance(&mut self, py: Python<'_>, mut n: i64, at: &AtomicI64, changes: &AtomicI64) -> PyResult<()> {
-        let Loop { world, arrays, force, live } = self;
+    /// `n` steps; long calls let other threads run and check for Ctrl-C. Whether a number of the state is not finite then.
+    fn advance(&mut self, py: Python<'_>, mut n: i64, at: &AtomicI64, changes: &AtomicI64) -> PyResult<bool> {
+        let Loop { world, arrays, force, live, unchecked } = self;
+        // To check many numbers takes a part of the time of a step.
+        *unchecked += if matches!(arrays, Arrays::Few { .. }) { STEPS_PER_CHECK } else { n };
+        let checks = *unchecked >= STEPS_PER_CHECK;
+        if checks {
+            *unchecked = 0;
+        }
         if let Some(live) = live {
             live.read(py, world, changes)?;
         }
@@ -263,7 +273,7 @@ impl<T: Of> Loop<T> {
             let Some(steps_between_checks) = world.steps_between_checks() else {
                 let result = interruptible(py, None, |monitor| world.step_in_background(n, v, y, monitor));
                 at.store(world.step_number(), Relaxed);
-                return result;
+                return result.map(|()| checks && !world::are_finite(v, y));
             };
             while n > steps_between_checks {
                 py.detach(|| world.step(steps_between_checks, v, y));
@@ -277,7 +287,7 @@ impl<T: Of> Loop<T> {
                 world.step(n, v, y);
             }
             at.store(world.step_number(), Relaxed);
-            Ok(())
+            Ok(checks && !world::are_finite(v, y))
         })
     }
 }
@@ -292,7 +302,7 @@ struct Made<'a> {
 impl<T: Of> Loop<T> {
     /// One step, of which only the first rows of y go on.
     fn play(&mut self, py: Python<'_>, [kept, read]: [usize; 2], made: Made<'_>, changes: &AtomicI64) -> PyResult<()> {
-        let Loop { world, arrays, force, live } = self;
+        let Loop { world, arrays, force, live, .. } = self;
         if let Some(live) = live {
             live.read(py, world, changes)?;
         }
@@ -390,9 +400,9 @@ impl World {
         Ok(World { loop_: Mutex::new(made), clock, step: AtomicI64::new(first), changes: AtomicI64::new(0) })
     }
 
-    /// `n` steps, in place.
+    /// `n` steps, in place. Whether a number of the state is not finite then, if that was checked.
     #[pyo3(signature = (n = None), text_signature = "($self, n=1)")]
-    fn step(&self, py: Python<'_>, n: Option<&Bound<'_, PyAny>>) -> PyResult<()> {
+    fn step(&self, py: Python<'_>, n: Option<&Bound<'_, PyAny>>) -> PyResult<bool> {
         let most = LAST_STEP - self.step.load(Relaxed);
         let n = match n {
             None if most >= 1 => 1,

@@ -167,7 +167,10 @@ def reading(system: System) -> Reading:
 
 
 class _Cached(NamedTuple):
-    """A derivative and what was traced; ``whole`` if each element of the matrix has operations, else it is along a direction."""
+    """A derivative and what was traced; ``whole`` if each element of the matrix has operations, else it is along a direction.
+
+    With ``what`` "values" it is no derivative but the rates alone.
+    """
 
     system: System
     what: str
@@ -190,7 +193,14 @@ def _cached(system: System, what: str, method: Method | None) -> _Cached:
             return each
     traced = Traced(system, what, method)
     whole = len(traced.tape) * traced.length <= MAX_WHOLE
-    entry = _Cached(system, what, method, traced.jacobian() if whole else traced.tangent(), whole)
+    alone = what == "values"
+    entry = _Cached(
+        system,
+        what,
+        method,
+        traced.evaluation(traced.roots) if alone else traced.jacobian() if whole else traced.tangent(),
+        whole,
+    )
     _last.append(entry)
     return entry
 
@@ -228,6 +238,15 @@ def matrix(
     for k, value in enumerate(entry.evaluation([*rows, nothing, *changes], t, h)):
         (values if k < n else derivative)[k % n] = value
     return derivative, values
+
+
+def rates(system: System, members: Shape, v: Array, y: Array, t: Any = 0.0) -> Array:
+    """The rates at a state without their derivatives, shape (n, *members)."""
+    evaluation = _cached(system, "values", None).evaluation
+    values = np.empty((prod(system.v_shape) + prod(system.y_shape), *members))
+    for k, value in enumerate(evaluation([*_rows(system, v, y), np.zeros(())], t, 1.0)):
+        values[k] = value
+    return values
 
 
 def of_rates(system: System, members: Shape, t: Any, v: Array, y: Array) -> Array:

@@ -39,7 +39,7 @@ class LinearisedLoop(ValueEquality):
     Attributes:
         method: the name of the method.
         dt: its step.
-        period: the time from one sample to the next.
+        period: the time from one sample to the next; of several controllers that after which all of them sample together again.
         P: the derivative of the state after a period by that before, shape (n, n, *batch): v, y, the controller's own state, its
             results that wait, and what it holds.
     """
@@ -111,7 +111,7 @@ def linearised_loop(system: System, method: str | Method, *, dt: float, y: Any, 
     request = Request.of(system, method, Options(v=v, y=y, dt=dt, t0=t0, steps=1))
     plan, memory = request.plan, request.plan.memory
     assert memory is not None
-    steps = plan.system.controller.timing.steps
+    steps = plan.system.controller.cycle
     if steps > MOST_STEPS:
         raise ArgumentError(f"dt: expected at most {MOST_STEPS} steps in a period, got {steps}")
     tape, marks = Tape(), Marks()
@@ -132,6 +132,6 @@ def linearised_loop(system: System, method: str | Method, *, dt: float, y: Any, 
             matrix = np.stack([np.broadcast_to(each, batch) for each in made[: n * n]]).reshape(n, n, *batch)
             whole = np.einsum("ij...,jk...->ik...", matrix, whole)
             z = list(made[n * n :])
-    count = n - len(memory)  # of steps, which depends on nothing else
-    P = np.delete(np.delete(whole, count, axis=0), count, axis=1)
+    counts = [n - len(memory) + i for i in plan.system.controller.counters(plan.system)]  # of steps: they depend on nothing else
+    P = np.delete(np.delete(whole, counts, axis=0), counts, axis=1)
     return LinearisedLoop(method.name, plan.dt, steps * abs(plan.dt), P)

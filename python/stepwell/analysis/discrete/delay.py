@@ -58,7 +58,7 @@ def shifted(P: Array, Q: Array, after: Array, D: Array, whole: int) -> Parts:
     return Parts(P, {whole: Q, whole - 1: after}, {whole: D})
 
 
-def divided(system: LinearSystem, P: Array, D: Array, way: str, between: str | None, dt: float, late: tuple[int, float]) -> Parts:
+def divided(system: LinearSystem, P: Array, D: Array, way: str, between: str | None, dt: float, late: tuple[int, Any]) -> Parts:
     """The parts of an exact step in which the sample changes at this time after its begin."""
     whole, rest = late
     A, B = system.A, system.B

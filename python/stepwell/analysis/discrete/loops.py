@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from ...base import checks
+from ...base.arrays import Array
 from ...base.reprs import counted
 from ...errors import ArgumentError, ShapeError
 from ...model.systems import LinearSystem
@@ -15,11 +16,18 @@ from ...model.systems.linear import is_gain, part_of
 from ...model.systems.realisation import Realisation, coefficients, feedback, of_gain, of_polynomials, series
 from ..stability import eigen
 from .delay import MOST_SAMPLES
+from .many_samples import MOST_AS_MATRIX, grow, scaled
 from .systems import DiscreteSystem, discretise
 
-#: Samples that are tried in each decade, how far they reach beyond the corners of plant and controller, as factors, and halvings
-#: of the interval in which the loop begins to grow.
-IN_DECADE, SHORTER, LONGER, HALVINGS = 30, 1e-3, 1e3, 60
+#: Samples that are tried in each decade, and how far they reach beyond the corners of plant and controller, as factors.
+IN_DECADE, SHORTER, LONGER = 30, 1e-3, 1e3
+
+#: Samples that are tried together, and parts into which the interval is divided in which the loop begins to grow; fewer where
+#: each one takes as long as a call.
+TOGETHER, FEW = 128, 4
+
+#: The shortest samples that are tried are these shares of a dead time, the second only if the loop is not stable with the first.
+OF_DELAY = 1e-2, 3e-3
 
 #: A slower corner than this share of the fastest counts as one at 0, which a sample of any length sees so.
 LEAST = 1e-12
@@ -122,8 +130,8 @@ def sampling_limit(plant: Any, controller: Any, *, delay: float = 0.0, samples: 
         how: as for ``sampled_loop``.
 
     Returns:
-        The limit in units of time: 0 if the loop is not stable with the shortest samples, infinity if it is with samples of a
-        thousand times the longest time constant.
+        The limit in units of time: 0 if the loop is not stable with the shortest samples, a thousandth of the shortest time
+        constant and 0.003 of the dead time; infinity if it is with samples of a thousand times the longest time constant.
 
     Raises:
         ArgumentError: if an argument is wrong.
@@ -153,30 +161,41 @@ def sampling_limit(plant: Any, controller: Any, *, delay: float = 0.0, samples: 
     fast, slow = (float(every.max()), float(every.min())) if every.size else (1.0, 1.0)
     slow = max(slow, LEAST * fast)
 
-    def grows(dt: float, slack: float = 0.0) -> bool:
-        return bool(sampled_loop(system, controller, dt, delay=delay, samples=samples, how=how).radius > 1.0 + slack)
-
     shortest = SHORTER / fast
     longest = LONGER / slow
-    if delay > 0.0:
-        shortest = max(shortest, delay * SHORTER)
     if not 0.0 < shortest < longest < inf:
         raise ArgumentError(f"plant, controller: expected corners of sizes that can be computed with, got {fast:g} and {slow:g}")
-    tried = np.geomspace(shortest, longest, max(2, round(IN_DECADE * np.log10(longest / shortest))))
-    before = 0.0
-    for dt in tried.tolist():
-        if grows(dt, ROUNDING * min(1.0, dt * fast)):  # with short samples all eigenvalues are near 1
-            break
-        before = dt
-    else:
-        return inf
+
+    of_controller = controller if is_gain(controller) else LinearSystem.of(controller)
+
+    def controlled(dts: Array) -> Realisation:
+        return _controller(controller if is_gain(controller) else scaled(of_controller, dts), 1.0, how)
+
+    def grown(dts: Array, share: float) -> Any:
+        slack = share * np.minimum(1.0, dts * fast)  # with short samples all eigenvalues are near 1
+        return grow(system, controlled, dts, delay, samples, slack)
+
+    first = [max(shortest, share * delay) for share in OF_DELAY]
+    sampled_loop(system, controller, first[0], delay=delay, samples=samples, how=how)  # checks it all
+    before = next((dt for dt in first if not grown(np.array([dt]), ROUNDING)[0]), 0.0)
     if before == 0.0:
         return 0.0
-    low, high = before, dt
-    for _ in range(HALVINGS):
-        middle = 0.5 * (low + high)
-        low, high = (low, middle) if grows(middle) else (middle, high)
-    return low
+    tried = np.geomspace(before, max(longest, 2.0 * before), max(2, round(IN_DECADE * np.log10(longest / before))))
+    for k in range(1, len(tried), TOGETHER):
+        some = grown(tried[k : k + TOGETHER], ROUNDING)
+        if some.any():
+            break
+    else:
+        return inf
+    low, high = tried[k + some.argmax() - 1 : k + some.argmax() + 1].tolist()
+    parts = TOGETHER if delay + samples * low <= MOST_AS_MATRIX * low else FEW
+    while (within := low + (high - low) * np.arange(1, parts) / parts)[0] > low:
+        places = [low, *within.tolist(), high]
+        at = int(np.append(grown(within, 0.0), True).argmax())
+        if (low, high) == (places[at], places[at + 1]):
+            break
+        low, high = places[at], places[at + 1]
+    return float(low)
 
 
 def _corners(plant: LinearSystem, controller: Any) -> Any:

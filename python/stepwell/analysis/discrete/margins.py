@@ -12,7 +12,7 @@ import numpy as np
 from ...base import checks
 from ...base.arrays import Array
 from ...base.immutable import ValueEquality
-from ...errors import ShapeError
+from ...errors import ArgumentError, ShapeError
 from ...model.systems import LinearSystem
 from ...model.systems.linear import part_of
 from ..stability import eigen
@@ -21,6 +21,9 @@ from .systems import DiscreteSystem
 
 #: Frequencies in each decade of the search for crossings, and how far it goes beyond the corners of a system, as a factor.
 IN_DECADE, BEYOND = 200, 1e4
+
+#: The phase of a dead time up to which each turn of it is seen, in radians; beyond that only those between frequencies above.
+MOST_TURNS = 1e4
 
 #: Halvings of an interval with a crossing: to the last digit.
 HALVINGS = 60
@@ -78,13 +81,14 @@ class Margins(ValueEquality):
         return max(0.0, self.phase) * pi / 180.0 / self.phase_frequency
 
 
-def margins(loop: Any) -> Margins:
+def margins(loop: Any, *, delay: float = 0.0) -> Margins:
     """The gain and phase margins of an open loop with one input and one output.
 
     They say something if the loop itself is stable, as most are; else count the poles of the closed loop, ``feedback(loop)``.
 
     Args:
         loop: a linear system, from the sum to where the feedback is taken; or a ``DiscreteSystem``, seen up to π/dt.
+        delay: dead time in the loop, in units of time; that of a ``DiscreteSystem`` is an argument of ``discretise``.
 
     Returns:
         The ``Margins``.
@@ -97,7 +101,12 @@ def margins(loop: Any) -> Margins:
         >>> round(found.gain, 6), round(found.phase, 3), round(found.gain_frequency, 6)  # 8/4, at √3
         (2.0, 27.142, 1.732051)
     """
+    delay = checks.number("delay", delay, unit="units of time")
+    if delay < 0.0:
+        raise ArgumentError(f"delay: expected a time of zero or more, got {delay:g}")
     if isinstance(loop, DiscreteSystem):
+        if delay:
+            raise ArgumentError("delay: a DiscreteSystem has its dead time within; give it to discretise(system, dt, delay=…)")
         P, last = loop.standard()[0], pi / loop.dt
         with np.errstate(all="ignore"):
             corners = np.abs(np.log(eigen.eigenvalues(P).reshape(-1))) / loop.dt
@@ -111,26 +120,32 @@ def margins(loop: Any) -> Margins:
         raise ShapeError(f"loop: expected one input, one output and one member, got {what}")
 
     def of(omega: Any) -> Any:
-        return frequency_response(loop, omega)
+        return frequency_response(loop, omega) * np.exp(-1j * delay * omega) if delay else frequency_response(loop, omega)
 
-    corners = corners[np.isfinite(corners) & (corners > 0.0)]
+    corners = np.append(corners[np.isfinite(corners) & (corners > 0.0)], [1.0 / delay] if delay else [])
     low, high = (corners.min() / BEYOND, corners.max() * BEYOND) if corners.size else (1.0 / BEYOND, BEYOND)
     high = min(high, last)
     low = min(low, high / BEYOND)
-    return of_response(of, np.geomspace(low, high, max(2, round(IN_DECADE * np.log10(high / low)))), last)
+    omega = np.geomspace(low, high, max(2, round(IN_DECADE * np.log10(high / low))))
+    if delay:  # whose phase turns evenly, at last faster than the grid
+        omega = np.union1d(omega, np.arange(low, min(high, MOST_TURNS / delay), 0.5 / delay))
+    return of_response(of, omega, last, delay)
 
 
-def of_response(of: Callable[[Any], Any], omega: Array, last: float) -> Margins:
-    """The margins of a loop by its response, which is searched at these frequencies; samples end at the last one."""
+def of_response(of: Callable[[Any], Any], omega: Array, last: float, delay: float = 0.0) -> Margins:
+    """The margins of a loop by its response, which is searched at these frequencies; samples end at the last one.
+
+    ``delay`` is a dead time in the response, whose lag may be more than a turn.
+    """
     at = of(omega)
     ones = _crossings(of, omega, at, lambda z: np.abs(z) - 1.0)
     turns = [w for w in _crossings(of, omega, at, lambda z: z.imag) if of(w).real < 0.0]
     if last < inf and (end := of(last)).real < 0.0 and abs(end.imag) < 1e-9 * abs(end.real):
         turns.append(last)
     gains = {w: 1.0 / abs(of(w)) for w in turns}
-    phases = {w: float(np.degrees(np.angle(-of(w)))) for w in ones}
+    phases = {w: float(np.degrees(np.angle(-of(w) * np.exp(1j * delay * w)) - delay * w)) for w in ones}
     at_gain = min(gains, key=lambda w: abs(np.log(gains[w])), default=None)
-    at_phase = min(phases, key=lambda w: abs(phases[w]), default=None)
+    at_phase = min(phases, key=lambda w: phases[w] if delay else abs(phases[w]), default=None)
     return Margins(
         inf if at_gain is None else float(gains[at_gain]),
         inf if at_phase is None else phases[at_phase],
@@ -142,14 +157,10 @@ def of_response(of: Callable[[Any], Any], omega: Array, last: float) -> Margins:
 def _crossings(of: Any, omega: Array, at: Any, level: Any) -> list[float]:
     """The frequencies at which a function of the response changes its sign, by halving."""
     value = level(at)
-    crossings = []
-    for i in np.flatnonzero((np.sign(value[:-1]) != np.sign(value[1:])) & np.isfinite(value[:-1]) & np.isfinite(value[1:])):
-        low, high, side = omega[i], omega[i + 1], np.sign(value[i])
-        for _ in range(HALVINGS):
-            middle = 0.5 * (low + high)
-            if np.sign(level(of(middle))) == side:
-                low = middle
-            else:
-                high = middle
-        crossings.append(float(high))
-    return crossings
+    i = np.flatnonzero((np.sign(value[:-1]) != np.sign(value[1:])) & np.isfinite(value[:-1]) & np.isfinite(value[1:]))
+    low, high, side = omega[i], omega[i + 1], np.sign(value[i])
+    for _ in range(HALVINGS if len(i) else 0):
+        middle = 0.5 * (low + high)
+        is_before = np.sign(level(of(middle))) == side
+        low, high = np.where(is_before, middle, low), np.where(is_before, high, middle)
+    return [float(each) for each in high]

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from functools import cached_property
 from math import pi, tan
 from typing import TYPE_CHECKING, Any, NamedTuple, cast
@@ -13,14 +14,16 @@ from ...base import checks
 from ...base.arrays import Array, Shape
 from ...base.immutable import ValueEquality, by_value
 from ...base.reprs import counted, facts
-from ...errors import ArgumentError, ShapeError, UnsupportedError
+from ...errors import ArgumentError, DTypeError, ShapeError, UnsupportedError
 from ...model.compatibility import fits_together
 from ...model.inputs import Sampled
 from ...model.methods import Method, methods
 from ...model.methods import method as find_method
 from ...model.parameters import aligned
-from ...model.systems import LinearSystem
-from ...model.systems.linear import realised
+from ...model.systems import LinearSystem, System
+from ...model.systems.linear import is_gain, realised
+from ...model.systems.realisation import Realisation, of_gain, parallel, series, sum_of
+from ...model.systems.realisation import times as product_of
 from ...reference import exact
 from ...reference.product import product, times
 from ...reference.resolvent import polynomials
@@ -73,6 +76,9 @@ class DiscreteSystem(ValueEquality):
         C: output matrix, shape (outputs, n, *batch); without C of the system the outputs are the states.
         D: feedthrough matrix, shape (outputs, inputs, *batch).
         delay: the dead time of the inputs. Its samples under way are states behind those of the system, the newest first.
+
+    ``a * b`` is the system in which the outputs of b are the inputs of a, ``a + b`` and ``a - b`` have common inputs and add or
+    subtract outputs; either may be a number, a gain. Systems have the same dt, and join in the form of ``standard``.
 
     Example:
         >>> held = sw.discretise(sw.TransferFunction(1.0, [1.0, 0.0]), 0.5)  # an integrator
@@ -133,6 +139,57 @@ class DiscreteSystem(ValueEquality):
             return self.P, self.Q, self.C, self.D
         return P, Q + product(P, after), C, D + product(C, after)
 
+    #: So that an array of NumPy times a system is a system with that gain, and not an array of systems.
+    __array_ufunc__ = None
+
+    def __mul__(self, before: Any) -> Any:
+        """The outputs of ``before``, or the inputs times a number, are the inputs of this system."""
+        if not is_gain(before):
+            return self._with(before, lambda own, other: series(other, own))
+        gain = of_gain("gain", before, self.D.shape[1], self.D.shape[1]).D
+        return replace(self, Q=product_of(self.Q, gain), Q_next=product_of(self.Q_next, gain), D=product_of(self.D, gain))
+
+    def __rmul__(self, gain: Any) -> Any:
+        """The outputs times a number."""
+        if not is_gain(gain):
+            return self._with(gain, series)
+        gain = of_gain("gain", gain, len(self.D), len(self.D)).D
+        return replace(self, C=product_of(gain, self.C), D=product_of(gain, self.D))
+
+    def __add__(self, other: Any) -> Any:
+        """Common inputs, and the sum of the outputs."""
+        if not is_gain(other):
+            return self._with(other, parallel)
+        return replace(self, D=sum_of(self.D, of_gain("gain", other, *self.D.shape[:2]).D))
+
+    __radd__ = __add__
+
+    def __sub__(self, other: Any) -> Any:
+        """Common inputs, and the difference of the outputs."""
+        return self + -1.0 * other if isinstance(other, DiscreteSystem) or is_gain(other) else self._with(other, parallel)
+
+    def __rsub__(self, gain: Any) -> Any:
+        """A gain less this system."""
+        return -1.0 * self + gain
+
+    def __neg__(self) -> Any:
+        """The outputs with the other sign."""
+        return -1.0 * self
+
+    def _with(self, other: Any, join: Callable[[Realisation, Realisation], Realisation]) -> Any:
+        """This system and another one of samples, in the standard form."""
+        if isinstance(other, System):
+            raise DTypeError(
+                f"system: expected another one of samples, got one of continuous time, {other!r}; discretise both "
+                f"with the same dt, or discretise what they are together"
+            )
+        if not isinstance(other, DiscreteSystem):
+            return NotImplemented
+        if other.dt != self.dt:
+            raise ArgumentError(f"dt: expected two systems with the same, got {self.dt:g} and {other.dt:g}")
+        whole = join(*(Realisation(*each.standard(), (), (None,) * each.Q.shape[1]) for each in (self, other)))
+        return DiscreteSystem(self.system, "joined", "hold", self.dt, whole.A, whole.B, np.zeros_like(whole.B), whole.C, whole.D)
+
     def frequency_response(self, omega: Any) -> Complex:
         """Z/X at z = e^(jω·dt).
 
@@ -171,7 +228,7 @@ class DiscreteSystem(ValueEquality):
             wanted = "(samples, batch…)" if m == 1 else f"(samples, {m}, batch…)"
             raise ShapeError(f"x: expected shape {wanted}, with at least one sample, got {np.shape(x)}")
         s = checks.numbers("start", 0.0 if start is None else start)
-        if s.ndim and len(s) == len(self.system.A) < n:
+        if s.ndim and len(s) == len(self.system.A) < n and self.how != "joined":
             s = np.concatenate([s, np.zeros((n - len(s), *s.shape[1:]))])
         s = checks.block("start", s, (n,), "states")
         batch = checks.batch_shape({"x": samples.shape[2:], "start": s.shape[1:], "system": self.batch})

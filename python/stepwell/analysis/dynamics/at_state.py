@@ -130,18 +130,31 @@ def jacobian(system: System, *, y: Any, v: Any = None, t: float = 0.0) -> Jacobi
 def linearised(system: System, v: Array, y: Array, t: Any = 0.0) -> tuple[Array, Array]:
     """The derivative of the rates at states, shape (n, n, *members), and the rates there, shape (n, *members)."""
     members = traced.together(system, v, y, t=t)
-    if not system.complex_step or sum(maps.size(system)) <= MAX_TRACED_NUMBERS:
+    if _is_traced(system):
         return traced.matrix(system, "rates", None, members, v, y, t)
     matrix = np.broadcast_to(maps.rates(system, t, v, y), (*[sum(maps.size(system))] * 2, *members))
+    return matrix, rates_at(system, v, y, t)
+
+
+def rates_at(system: System, v: Array, y: Array, t: Any = 0.0) -> Array:
+    """The rates at states, shape (n, *members)."""
+    members = traced.together(system, v, y, t=t)
+    if _is_traced(system):
+        return traced.rates(system, members, v, y, t)
     v, y = (maps.spread(block, shape, members) for block, shape in ((v, system.v_shape), (y, system.y_shape)))
     with np.errstate(all="ignore"):
         s = system.scaled(1.0, members)
-        return matrix, np.concatenate([s.dv(t, v, y).reshape(-1, *members), s.dy(t, v, y).reshape(-1, *members)])
+        return np.concatenate([s.dv(t, v, y).reshape(-1, *members), s.dy(t, v, y).reshape(-1, *members)])
 
 
-def by_growth(matrix: Array) -> Complex:
-    """Eigenvalues, the largest real part first; among equal ones the fastest first, and in a pair the positive angle first."""
+def _is_traced(system: System) -> bool:
+    return not system.complex_step or sum(maps.size(system)) <= MAX_TRACED_NUMBERS
+
+
+def by_growth(matrix: Array, zeros: int = 0) -> Complex:
+    """Eigenvalues, and further ``zeros``, the largest real part first; then the fastest first, in a pair the positive angle."""
     values = eigen.eigenvalues(matrix)
+    values = np.concatenate([values, np.zeros((zeros, *values.shape[1:]))])
     size = np.abs(values).max(axis=0)
     with np.errstate(divide="ignore", invalid="ignore"):
         real = np.round(values.real / np.where(size > 0.0, size, 1.0), 9)

@@ -110,8 +110,9 @@ class Elements(NamedTuple):
 
     @property
     def mean_longitude(self) -> Array:
-        """Ω + ω and the mean anomaly, −π to π."""
-        return _within_a_turn(self.node + self.argument_of_periapsis + self.mean_anomaly)
+        """Ω + ω and the mean anomaly, −π to π; where e ≥ 1, its mean anomaly is no angle, and it has any size."""
+        longitude = self.node + self.argument_of_periapsis + self.mean_anomaly
+        return np.where(self.e < 1.0, _within_a_turn(longitude), longitude)
 
     @property
     def time_of_periapsis(self) -> Array:

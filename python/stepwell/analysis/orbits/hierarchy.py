@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -40,6 +41,24 @@ class Start(NamedTuple):
     y: Array
 
 
+#: What elements that are written by a letter are called here, as REBOUND and books have them.
+HINTS = {
+    "P": "the time of a revolution is period=",
+    "M": "the mean anomaly is mean_anomaly=",
+    "f": "the true anomaly is true_anomaly=",
+    "E": "the eccentric anomaly is eccentric_anomaly=",
+    "T": "the time of the periapsis is time_of_periapsis=",
+    "l": "the mean longitude is mean_longitude=",
+    "theta": "the true longitude is true_longitude=",
+    "inc": "the inclination is inclination=",
+    "Omega": "the longitude of the node is node=",
+    "omega": "the argument of the periapsis is argument_of_periapsis=",
+    "pomega": "the longitude of the periapsis is longitude_of_periapsis=",
+    "m": "the masses stand first, those of all bodies",
+}
+
+
+@checks.with_hints(HINTS)
 def system(
     masses: Any,
     *,
@@ -280,15 +299,15 @@ def _elements(bodies: NBody, v: Array, y: Array, t: Array, around: Any) -> Eleme
     return of_pair(mu, v, y, np.broadcast_to(t, mu.shape))
 
 
-def _centres(around: Any, orbits: int) -> list[list[int]]:
+def _centres(around: Any, orbits: int) -> list[Sequence[int]]:
     """The bodies whose centre of mass each orbiting body goes around."""
     if isinstance(around, str) or (isinstance(around, np.ndarray) and around.ndim == 0):
         word = checks.known("around", around, CENTRES)
-        return [list(range(k)) if word == "jacobi" else [0] for k in range(1, orbits + 1)]
+        return [range(k) if word == "jacobi" else [0] for k in range(1, orbits + 1)]
     each = checks.several("around", around, "numbers of bodies, or lists of them")
     if len(each) != orbits:
         raise ShapeError(f"around: expected one entry for each of the {orbits} orbiting bodies, got {len(each)}")
-    centres = []
+    centres: list[Sequence[int]] = []
     for k, centre in enumerate(each, 1):
         some = list(centre) if isinstance(centre, (list, tuple, range)) else [centre]
         members = [checks.count(f"around[{k - 1}]", member, 0, k - 1) for member in some]
@@ -298,25 +317,46 @@ def _centres(around: Any, orbits: int) -> list[list[int]]:
     return centres
 
 
-def _strengths(masses: Array, centres: list[list[int]]) -> Array:
+def _strengths(masses: Array, centres: list[Sequence[int]]) -> Array:
     """The mass of each orbiting body and its centre together."""
-    return np.stack([masses[members].sum(axis=0) + masses[k] for k, members in enumerate(centres, 1)])
+    before = np.cumsum(masses, axis=0)
+    sums = (before[k - 1] if isinstance(of, range) else masses[of].sum(axis=0) for k, of in enumerate(centres, 1))
+    return np.stack([mass + masses[k] for k, mass in enumerate(sums, 1)])
 
 
-def _gathered(masses: Array, relative: Array, centres: list[list[int]]) -> Array:
+def _gathered(masses: Array, relative: Array, centres: list[Sequence[int]]) -> Array:
     """Places from those relative to centres, (orbits, dim, *batch), with the centre of mass of all at the origin."""
     rows = [np.zeros(relative.shape[1:])]
-    for k, members in enumerate(centres):
-        rows.append(_centre(masses, rows, members) + relative[k])
-    return np.stack(rows) - _centre(masses, rows, list(range(len(rows))))
+    before = _Before(masses[0], rows[0])
+    for k, members in enumerate(centres, 1):
+        rows.append((before.centre if isinstance(members, range) else _centre(masses, rows, members)) + relative[k - 1])
+        before.add(masses[k], rows[k])
+    return np.stack(rows) - before.centre
 
 
-def _apart(masses: Array, block: Array, centres: list[list[int]]) -> Array:
+def _apart(masses: Array, block: Array, centres: list[Sequence[int]]) -> Array:
     """The inverse: places relative to centres."""
-    return np.stack([block[k] - _centre(masses, block, members) for k, members in enumerate(centres, 1)])
+    rows, before = [], _Before(masses[0], block[0])
+    for k, members in enumerate(centres, 1):
+        rows.append(block[k] - (before.centre if isinstance(members, range) else _centre(masses, block, members)))
+        before.add(masses[k], block[k])
+    return np.stack(rows)
 
 
-def _centre(masses: Array, rows: Any, members: list[int]) -> Array:
+class _Before:
+    """The bodies up to one, for their centre of mass, which the next one moves; without mass, their mean."""
+
+    def __init__(self, mass: Array, row: Array) -> None:
+        self.count, self.mass, self.centre = 1, mass, row
+
+    def add(self, mass: Array, row: Array) -> None:
+        """One more body."""
+        self.count, self.mass = self.count + 1, self.mass + mass
+        share = np.where(self.mass > 0.0, mass / np.where(self.mass > 0.0, self.mass, 1.0), 1.0 / self.count)
+        self.centre = np.where(share == 1.0, row, self.centre + share * (row - self.centre))
+
+
+def _centre(masses: Array, rows: Any, members: Sequence[int]) -> Array:
     """The centre of mass; of bodies without mass, their mean."""
     if len(members) == 1:
         return np.asarray(rows[members[0]])

@@ -326,7 +326,9 @@ def state_argument(at: Any, v: Any, y: Any) -> Any:
 
 
 def state(argument: str, system: System, at: Any, or_what: str = "of blocks") -> tuple[Array, Array]:
-    """The blocks of a state from an argument that should be a pair (v, y)."""
+    """The blocks of a state from an argument that should be a pair (v, y); without velocities an array is y."""
+    if isinstance(at, np.ndarray) and system.v_shape == (0,):
+        at = None, at
     if not isinstance(at, (tuple, list)) or len(at) != 2:
         got = f"{len(at)} of them" if isinstance(at, (tuple, list)) else type(at).__name__
         raise DTypeError(f"{argument}: expected a pair (v, y) {or_what}, got {got}")

@@ -73,7 +73,8 @@ def stability_limit(system: System, method: str | Method, *, at: Any = None, t: 
 
     Returns:
         A ``StabilityLimit``, which is a float with a ``mode``; an array of them for a batch (``StabilityLimits``). It is NaN, and
-        its ``decided`` False, where rounding hides the limit between ``stable`` and ``grows``, in units of time.
+        its ``decided`` False, where rounding hides the limit between ``stable`` and ``grows``, in units of time, and where
+        derivatives of the rates are not finite.
 
     Raises:
         ArgumentError: what was given and what was expected.
@@ -120,6 +121,9 @@ def limit_of(system: System, method: Method, v: Array | None = None, y: Array | 
     limits, grows, modes = _of_all(system, method, v, y, t, members)
     spread: list[Any] = [np.array(np.broadcast_to(each, members)) for each in (limits, grows, modes)]
     limits, grows, modes = spread
+    if v is not None and y is not None and isinstance(system, OwnSystem) and not (system.linear or system.around):
+        unknown = ~np.isfinite(traced.of_rates(system, members, t, v, y)).all(axis=(0, 1))
+        limits[unknown], grows[unknown], modes[unknown] = 0.0, np.inf, None
     if not limits.shape:
         return StabilityLimit(float(limits), modes[()], float(grows))
     return limits_of(limits, modes, grows)
@@ -229,6 +233,14 @@ def _warn(system: System, method: Method, limit: Any) -> None:
     stable, grows = (np.atleast_1d(each)[doubtful][0] for each in (limit.stable, limit.grows))
     one = isinstance(limit, StabilityLimit)
     which = "" if one else f" of {share(int(doubtful.sum()), limit.shape, limit.size)}"
+    if stable == 0.0 and grows == np.inf and not system.linear:
+        warnings.warn(
+            f"the limit{which} of {system!r} by {method.name} is NaN, because some derivatives of the rates at this state are "
+            f"not finite, as that of a root at zero is not (sw.jacobian shows which); ask for a state beside it",
+            AccuracyWarning,
+            stacklevel=3,
+        )
+        return
     hint = (
         f"systems of more than {exact.MAX_ROWS} states that cannot be decomposed are not computed in more digits"
         if system.linear

@@ -31,6 +31,12 @@ def size(system: System) -> tuple[int, int]:
     return prod(system.v_shape), prod(system.y_shape)
 
 
+def blocks(system: System, states: Array) -> tuple[Array, Array]:
+    """The blocks v and y of states that are columns of numbers, shape (n, *members)."""
+    n_v, members = size(system)[0], states.shape[1:]
+    return states[:n_v].reshape((*system.v_shape, *members)), states[n_v:].reshape((*system.y_shape, *members))
+
+
 def transition(system: System, method: Method, dt: Array) -> Array:
     """P of a linear system, of shape (n, n, *members): the unit vectors of the slots after a step.
 

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+import warnings
 from abc import abstractmethod
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Literal
 
 import gymnasium
 import numpy as np
+from gymnasium.spaces import Box, Discrete, MultiBinary, MultiDiscrete
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
 from ...base import checks
 from ...base.arrays import Array
-from ...errors import ArgumentError, DTypeError, ShapeError, UnsupportedError
+from ...errors import ArgumentError, DivergenceWarning, DTypeError, ShapeError, TooLargeError, UnsupportedError
 from ...model import setting
 from ...model.methods import Method
 from ...runs.world import World
@@ -22,6 +24,8 @@ Observations = np.ndarray[Any, np.dtype[np.float32]]
 Truths = np.ndarray[Any, np.dtype[np.bool_]]
 #: No environments.
 NONE = np.empty(0, np.intp)
+#: ``render`` returns no more frames than these, 0.7 GB.
+MOST_FRAMES = 1024
 
 
 def _mode(value: Any) -> AutoresetMode:
@@ -31,7 +35,32 @@ def _mode(value: Any) -> AutoresetMode:
     return AutoresetMode(checks.known("autoreset_mode", value, [each.value for each in AutoresetMode]))
 
 
-def _checked(world: World, randomise: Any) -> dict[str, tuple[Any, Any]]:
+def _ends(space: Any) -> tuple[Any, Any, bool]:
+    """The least and the largest action, and whether actions are whole numbers."""
+    if isinstance(space, Box):
+        return space.low, space.high, False
+    if isinstance(space, MultiBinary):
+        return 0, 1, True
+    return space.start, space.start + (space.n if isinstance(space, Discrete) else space.nvec) - 1, True
+
+
+def parts_of(returned: Any, rule: str, *names: str) -> Any:
+    """What a rule of an environment returned, which must be as many things as these names."""
+    several = isinstance(returned, (tuple, list)) or getattr(returned, "ndim", 0) > 0
+    if not several or len(returned) != len(names):
+        number = f"{len(returned)} values" if several else checks.short(returned)
+        raise ShapeError(f"{rule}: expected it to return ({', '.join(names)}), got {number}")
+    return returned
+
+
+def _of_shape(returned: Any, rule: str, shape: tuple[int, ...]) -> Array:
+    """Numbers that a rule of an environment returned."""
+    if np.shape(returned) != shape:
+        raise ShapeError(f"{rule}: expected it to return shape {shape}, got {np.shape(returned)}")
+    return np.asarray(returned)
+
+
+def _checked(world: World, randomise: Any, positive: tuple[str, ...]) -> dict[str, tuple[Any, Any]]:
     """The bounds of parameters that episodes draw anew. The parameters become ones of each member."""
     if not isinstance(randomise, dict):
         raise DTypeError(f"randomise: expected names with their bounds, got {checks.short(randomise)}")
@@ -41,7 +70,7 @@ def _checked(world: World, randomise: Any) -> dict[str, tuple[Any, Any]]:
             raise ShapeError(f"randomise[{name!r}]: expected bounds (low, high), got {checks.short(pair)}")
         world.parameters[name]  # or an error that says why it cannot be drawn
         own = setting.of_each_member(world.system, name, world.y.shape[-1:]).shape[:-1]
-        low, high = (checks.numbers(f"randomise[{name!r}]", each) for each in pair)
+        low, high = (checks.numbers(f"randomise[{name!r}]", each, positive=name in positive) for each in pair)
         if (low > high).any() or any(each.ndim and each.shape != own for each in (low, high)):
             raise ArgumentError(f"randomise[{name!r}]: expected bounds (low, high) of shape {own}, got {checks.short(pair)}")
         ends = [np.broadcast_to(np.broadcast_to(each, own)[..., np.newaxis], (*own, 1)) for each in (low, high)]
@@ -60,9 +89,10 @@ class WorldVectorEnv(VectorEnv):  # type: ignore[misc]  # gymnasium's types are 
     Args:
         num_envs: the number of environments.
         method: the method of the world: its name, or what ``stepwell.method`` returns.
-        dt: the step of the method, in seconds.
+        dt: the step of the method, in seconds; by default the class attribute ``usual_dt``, if there is one.
         substeps: the number of steps for each action.
-        max_episode_steps: the number of actions after which an episode is truncated; None for never.
+        max_episode_steps: the number of actions after which an episode is truncated; None for never; by default the class
+            attribute ``episode_steps``.
         render_mode: ``"rgb_array"``, so that ``render`` returns a frame of each environment; ``"human"``, so that a window shows
             the first 16 after each step; or None.
         dtype: ``"float64"`` or ``"float32"``, the precision of the world, and of what is computed from its states.
@@ -80,8 +110,8 @@ class WorldVectorEnv(VectorEnv):  # type: ignore[misc]  # gymnasium's types are 
         dtype: NumPy's type of the world's arrays, for ``make_world``.
 
     Raises:
-        ArgumentError: if an argument is wrong.
-        UnsupportedError: if ``make_world`` makes arrays of another type than ``dtype``.
+        ArgumentError: if an argument, or what a method of the subclass returns, is wrong.
+        UnsupportedError: if the subclass lacks a method, or its ``make_world`` makes arrays of another type than ``dtype``.
     """
 
     metadata: ClassVar[dict[str, Any]] = {
@@ -91,9 +121,13 @@ class WorldVectorEnv(VectorEnv):  # type: ignore[misc]  # gymnasium's types are 
     }
     #: Left, right, bottom and top of what pictures show.
     view: ClassVar[tuple[float, float, float, float]] = (-1.0, 1.0, -1.0, 1.0)
-    #: The usual length of an episode.
-    episode_steps: ClassVar[int]
-    #: The spaces of one environment.
+    #: The usual length of an episode; None if it has no end.
+    episode_steps: ClassVar[int | None] = None
+    #: The usual step, in seconds.
+    usual_dt: ClassVar[float | None] = None
+    #: The parameters of the system that mean nothing at zero and below, such as masses.
+    positive: ClassVar[tuple[str, ...]] = ()
+    #: The spaces of one environment: a ``Box``, and a ``Box``, ``Discrete``, ``MultiDiscrete`` or ``MultiBinary``.
     one_observation: ClassVar[Any]
     one_action: ClassVar[Any]
 
@@ -101,44 +135,60 @@ class WorldVectorEnv(VectorEnv):  # type: ignore[misc]  # gymnasium's types are 
         self,
         num_envs: int = 1,
         *,
-        method: str | Method,
-        dt: float,
-        substeps: int,
-        max_episode_steps: int | None,
+        method: str | Method = "rk4",
+        dt: float | None = None,
+        substeps: int = 1,
+        max_episode_steps: int | Literal["usual"] | None = "usual",
         render_mode: str | None = None,
         dtype: Any = "float64",
         autoreset_mode: Any = AutoresetMode.NEXT_STEP,
         randomise: dict[str, tuple[Any, Any]] | None = None,
     ) -> None:
+        kind = type(self)
+        if missing := [name for name in dir(kind) if getattr(getattr(kind, name), "__isabstractmethod__", False)]:
+            raise UnsupportedError(f"{kind.__name__}: it needs {', '.join(missing)}; see the class that it is made from")
+        for name, kinds in (("one_observation", (Box,)), ("one_action", (Box, Discrete, MultiDiscrete, MultiBinary))):
+            if not isinstance(space := getattr(kind, name, None), kinds):
+                known = " or ".join(each.__name__ for each in kinds)
+                raise DTypeError(f"{kind.__name__}.{name}: expected {known} of gymnasium.spaces, got {checks.short(space)}")
         if render_mode is not None:
             checks.known("render_mode", render_mode, tuple(self.metadata["render_modes"]))
-            if type(self).sketch is WorldVectorEnv.sketch:
-                raise UnsupportedError(f"render_mode: {type(self).__name__} has no pictures; it needs a method sketch(member)")
+            if kind.sketch is WorldVectorEnv.sketch:
+                raise UnsupportedError(f"render_mode: {kind.__name__} has no pictures; it needs a method sketch(member)")
         self.num_envs = checks.count("num_envs", num_envs, 1)
         # Bounds of the observations, states, forces, draws, rewards, and the results of a step.
         seen = int(np.prod(self.one_observation.shape or (1,)))
         checks.fits("num_envs: states and observations", 8 * seen + 16, (self.num_envs,), "take fewer")
         self.substeps = checks.count("substeps", substeps, 1)
-        self.max_episode_steps = None if max_episode_steps is None else checks.count("max_episode_steps", max_episode_steps, 1)
+        most = self.episode_steps if max_episode_steps == "usual" else max_episode_steps
+        self.max_episode_steps = None if most is None else checks.count("max_episode_steps", most, 1)
         self.render_mode = render_mode
         self.single_observation_space, self.single_action_space = self.one_observation, self.one_action
         self.observation_space = batch_space(self.one_observation, self.num_envs)
         self.action_space = batch_space(self.one_action, self.num_envs)
         self.dtype: np.dtype[Any] = np.dtype(np.float32 if checks.is_single(dtype) else np.float64)
+        self._low, self._high, self._whole = _ends(self.one_action)
+        if dt is None and (dt := self.usual_dt) is None:
+            raise ArgumentError(f"dt: expected the step in seconds, since {kind.__name__} has no usual_dt")
         self.world = self.make_world(method, checks.number("dt", dt, positive=True, unit="seconds"))
+        if not isinstance(self.world, World) or self.world._plan.batch != (self.num_envs,):
+            made = f"one of members {self.world._plan.batch}" if isinstance(self.world, World) else checks.short(self.world)
+            rule = f"{kind.__name__}.make_world"
+            raise ShapeError(f"{rule}: expected a World of {self.num_envs} members, self.num_envs, got {made}")
         if self.world.y.dtype != self.dtype:
             raise UnsupportedError(
-                f"dtype: {type(self).__name__} makes a world of {self.world.y.dtype}, and {self.dtype} was asked for; let its "
+                f"dtype: {kind.__name__} makes a world of {self.world.y.dtype}, and {self.dtype} was asked for; let its "
                 f"make_world make arrays of self.dtype, and World(…, dtype=self.dtype)"
             )
         self.autoreset_mode = _mode(autoreset_mode)
         self._camera: Camera | None = None
         self._window: Window | None = None
         fps = max(1, round(1.0 / (self.world.dt * self.substeps)))
-        self.metadata = {**type(self).metadata, "autoreset_mode": self.autoreset_mode, "render_fps": fps}  # type: ignore[misc]  # Gymnasium reads it
-        self._randomised = {} if randomise is None else _checked(self.world, randomise)
+        self.metadata = {**kind.metadata, "autoreset_mode": self.autoreset_mode, "render_fps": fps}  # type: ignore[misc]  # Gymnasium reads it
+        self._randomised = {} if randomise is None else _checked(self.world, randomise, self.positive)
         self.steps = np.zeros(self.num_envs, dtype=np.int64)
         self._begun, self._over = False, np.zeros(self.num_envs, dtype=np.bool_)
+        self._has_warned = True  # the world does so itself, unless its steps are on a tape of their own
         self.prepare()
 
     def __getstate__(self) -> dict[str, Any]:
@@ -197,6 +247,11 @@ class WorldVectorEnv(VectorEnv):  # type: ignore[misc]  # gymnasium's types are 
     def render(self) -> tuple[Frame, ...] | None:
         """See Gymnasium: a frame of each environment, or a window that shows the first ones."""
         if self.render_mode == "rgb_array":
+            if self.num_envs > MOST_FRAMES:
+                raise TooLargeError(
+                    f"render: expected at most {MOST_FRAMES} environments, since each frame takes 0.7 MB, got {self.num_envs}; "
+                    "frames(16) returns those of the first 16"
+                )
             return self.frames(self.num_envs)
         if self.render_mode == "human":
             self._window = self._window or Window()
@@ -230,7 +285,15 @@ class WorldVectorEnv(VectorEnv):  # type: ignore[misc]  # gymnasium's types are 
         if actions.shape != self.action_space.shape or actions.dtype.kind not in "biuf":
             raise ShapeError(f"actions: expected shape {self.action_space.shape}, got {actions.dtype} of shape {actions.shape}")
         over = (self._over != 0).nonzero()[0] if self.begins_at_next_step else NONE
-        seen, rewards, terminated, truncated = self.advance(actions, over)
+        seen, rewards, terminated, truncated = self.advance(self._allowed(actions, over), over)
+        if not self._has_warned and terminated.any() and len(lost := np.flatnonzero(terminated & ~self._is_finite())):
+            self._has_warned = True
+            warnings.warn(
+                f"environment {lost[0]}{f' and {len(lost) - 1} more' * (len(lost) > 1)}: the state is no longer finite, so the "
+                "episode ends; take a shorter dt with more substeps, or another method",
+                DivergenceWarning,
+                stacklevel=2,
+            )
         if self.render_mode == "human":
             self.render()
         if self.autoreset_mode is not AutoresetMode.SAME_STEP or not len(ended := np.flatnonzero(terminated | truncated)):
@@ -240,6 +303,24 @@ class WorldVectorEnv(VectorEnv):  # type: ignore[misc]  # gymnasium's types are 
         self._begin(ended)
         return self.seen(), rewards, terminated, truncated, {"final_obs": last, "_final_obs": which}
 
+    def _allowed(self, actions: Any, over: Any) -> Any:
+        """The actions, those of a ``Box`` clipped to it; environments that begin anew may have any, which are not read."""
+        right = (actions >= self._low) & (actions <= self._high) if self._whole else np.isfinite(actions)
+        if self._whole and actions.dtype.kind == "f":
+            right &= actions == np.floor(actions)
+        if not right.all():
+            right[over] = True
+            for first in np.argwhere(~right)[:1]:
+                wrong = f"{actions[tuple(first)]:g} for environment {first[0]}"
+                raise ArgumentError(f"actions: expected finite numbers in {self.one_action}, got {wrong}")
+        return actions if self._whole else np.clip(actions, self._low, self._high)
+
+    def _is_finite(self) -> Truths:
+        """Whether the state of each environment is finite."""
+        v, y = (np.isfinite(block).reshape(-1, self.num_envs).all(axis=0) for block in (self.world.v, self.world.y))
+        finite: Truths = np.asarray(v & y)
+        return finite
+
     def advance(self, actions: Any, over: Any) -> tuple[Observations, Array, Truths, Truths]:
         """Apply the actions, make the steps, and judge; members whose episode is over begin anew instead."""
         self.begin_action(actions)
@@ -248,8 +329,10 @@ class WorldVectorEnv(VectorEnv):  # type: ignore[misc]  # gymnasium's types are 
             self.act(actions)
             self.world.step()
         self.steps += 1
-        rewards, terminated = self.judge(actions)
-        rewards = rewards if before is None else before
+        name, each = type(self).__name__, (self.num_envs,)
+        rewards, terminated = parts_of(self.judge(actions), f"{name}.judge", "rewards", "ends")
+        rewards = _of_shape(rewards if before is None else before, f"{name}.judge", each)
+        terminated = _of_shape(terminated, f"{name}.judge", each).astype(np.bool_) | ~self._is_finite()
         late = 2**62 if self.max_episode_steps is None else self.max_episode_steps
         truncated: Truths = self.steps >= late
         if len(over):
@@ -267,7 +350,12 @@ class WorldVectorEnv(VectorEnv):  # type: ignore[misc]  # gymnasium's types are 
     def _put(self, places: Any) -> None:
         """Draw states and parameters."""
         world = self.world
-        v, y = self.draw(len(places))
+        rule = f"{type(self).__name__}.draw"
+        blocks = []
+        for name, block, old in zip("vy", parts_of(self.draw(len(places)), rule, "v", "y"), (world.v, world.y), strict=True):
+            some = 0.0 if block is None and not old.size else block
+            blocks.append(checks.block(f"{rule}: {name}", some, (*old.shape[:-1], len(places)), "numbers of a state, count"))
+        v, y = blocks
         for name, (low, high) in self._randomised.items():
             array = world.parameters[name]
             array[..., places] = self.np_random.uniform(low, high, (*array.shape[:-1], len(places)))
@@ -285,7 +373,8 @@ class WorldVectorEnv(VectorEnv):  # type: ignore[misc]  # gymnasium's types are 
         """What is seen of the states, in float32."""
         # Rounding to float32 may pass a bound by one unit of its last place.
         space = self.one_observation
-        return np.clip(self.observe().astype(np.float32, copy=False), space.low, space.high)
+        seen = _of_shape(self.observe(), f"{type(self).__name__}.observe", self.observation_space.shape)
+        return np.clip(seen.astype(np.float32, copy=False), space.low, space.high)
 
 
 class WorldEnv(gymnasium.Env):  # type: ignore[misc]

@@ -61,24 +61,13 @@ class CartPoleVectorEnv(TracedVectorEnv):
     """
 
     episode_steps = 500
+    usual_dt = 0.02
+    positive = "cart", "pole", "half_length"
     one_observation = Box(
         -np.array([2 * END, MAX_SPEED, 2 * TILT, MAX_SPEED], np.float32),
         np.array([2 * END, MAX_SPEED, 2 * TILT, MAX_SPEED], np.float32),
     )
     one_action = Discrete(2)
-
-    def __init__(
-        self,
-        num_envs: int = 1,
-        *,
-        method: str | Method = "rk4",
-        dt: float = 0.02,
-        substeps: int = 1,
-        max_episode_steps: int | None = episode_steps,
-        **options: Any,
-    ) -> None:
-        settings: Any = {"method": method, "dt": dt, "substeps": substeps, "max_episode_steps": max_episode_steps}
-        super().__init__(num_envs, **settings, **options)
 
     def make_world(self, method: str | Method, dt: float) -> World:
         """Carts with poles."""

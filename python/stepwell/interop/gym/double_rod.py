@@ -45,21 +45,9 @@ class DoubleRodVectorEnv(TracedVectorEnv):
     """
 
     episode_steps = 500
+    usual_dt = 0.05
     one_observation = Box(-np.array([1.0] * 4 + [MAX_SPEED] * 2, np.float32), np.array([1.0] * 4 + [MAX_SPEED] * 2, np.float32))
     one_action = Box(-MAX_TORQUE, MAX_TORQUE, (1,), np.float32)
-
-    def __init__(
-        self,
-        num_envs: int = 1,
-        *,
-        method: str | Method = "rk4",
-        dt: float = 0.05,
-        substeps: int = 1,
-        max_episode_steps: int | None = episode_steps,
-        **options: Any,
-    ) -> None:
-        settings: Any = {"method": method, "dt": dt, "substeps": substeps, "max_episode_steps": max_episode_steps}
-        super().__init__(num_envs, **settings, **options)
 
     def make_world(self, method: str | Method, dt: float) -> World:
         """Two rods that hang from an anchor."""
@@ -82,7 +70,7 @@ class DoubleRodVectorEnv(TracedVectorEnv):
     def push(v: Any, y: Any, action: Any) -> tuple[Any, Any, Any]:
         """Turn the rods against each other."""
         (first, second), _ = _rods(v, y)
-        torque = np.minimum(np.maximum(action[0], -MAX_TORQUE), MAX_TORQUE)
+        torque = action[0]
         # A torque on a rod of length 1 is a pair of forces at its ends, across it. One end of the first rod is the anchor.
         on_tip = [torque * -second[1], torque * second[0]]
         on_joint = [-on_tip[0] - torque * -first[1], -on_tip[1] - torque * first[0]]

@@ -38,21 +38,9 @@ class PendulumVectorEnv(TracedVectorEnv):
     """
 
     episode_steps = 200
+    usual_dt = 0.05
     one_observation = Box(-np.array([1.0, 1.0, MAX_SPEED], np.float32), np.array([1.0, 1.0, MAX_SPEED], np.float32))
     one_action = Box(-MAX_TORQUE, MAX_TORQUE, (1,), np.float32)
-
-    def __init__(
-        self,
-        num_envs: int = 1,
-        *,
-        method: str | Method = "rk4",
-        dt: float = 0.05,
-        substeps: int = 1,
-        max_episode_steps: int | None = episode_steps,
-        **options: Any,
-    ) -> None:
-        settings: Any = {"method": method, "dt": dt, "substeps": substeps, "max_episode_steps": max_episode_steps}
-        super().__init__(num_envs, **settings, **options)
 
     def make_world(self, method: str | Method, dt: float) -> World:
         """Rods on hinges."""
@@ -68,7 +56,7 @@ class PendulumVectorEnv(TracedVectorEnv):
     @staticmethod
     def push(v: Any, y: Any, action: Any) -> tuple[Any, Any, Any]:
         """Turn the motor."""
-        return v, y, _torque(action) * (3.0 / (MASS * LENGTH * LENGTH))
+        return v, y, action[0] * (3.0 / (MASS * LENGTH * LENGTH))
 
     @staticmethod
     def settle(v: Any, y: Any) -> tuple[Any, Any]:
@@ -88,7 +76,7 @@ class PendulumVectorEnv(TracedVectorEnv):
         """
         speed, angle = before
         above = angle - 2.0 * np.pi * np.floor(angle / (2.0 * np.pi)) - np.pi
-        torque = _torque(action)
+        torque = action[0]
         return -(above * above + 0.1 * (speed * speed) + 0.001 * (torque * torque)), False
 
     view = (-1.8, 1.8, -1.2, 1.2)
@@ -98,10 +86,6 @@ class PendulumVectorEnv(TracedVectorEnv):
         angle = float(self.world.y[member])
         tip = LENGTH * np.sin(angle), -LENGTH * np.cos(angle)
         return [Line([(0.0, 0.0), tip], 14.0), Line([(0.0, 0.0)], 8.0, FIXED)]
-
-
-def _torque(action: Any) -> Any:
-    return np.minimum(np.maximum(action[0], -MAX_TORQUE), MAX_TORQUE)
 
 
 class PendulumEnv(WorldEnv):

@@ -11,7 +11,7 @@ import numpy as np
 
 from ... import _core
 from ...base.arrays import Array
-from ...errors import DTypeError, ShapeError
+from ...errors import ArgumentError, DTypeError, ShapeError
 from ...model.around import FORCE, Force
 from ...model.equations.namespace import rebound
 from ...model.equations.trace import run_function, scalars
@@ -20,10 +20,14 @@ from ...reference import bits, contact
 from ...reference.around import wrapped
 from ...reference.traced import Tracer
 from ...runs.world import World
-from .base import Observations, Truths, WorldVectorEnv
+from .base import Observations, Truths, WorldVectorEnv, parts_of
 
 #: Above so many operations a step is not one tape.
-MOST_OPERATIONS = 4000
+MOST_OPERATIONS = 100_000
+#: What the rules return.
+PARTS = {"push": ("v", "y", "a force or None"), "settle": ("v", "y"), "score": ("a reward", "an end")}
+#: What ``look`` returns.
+SEEN = "an observation, as one_observation is,"
 #: The rows behind the state that go on, and those of reward and truths: see ``World.play`` of the core.
 GO_ON, MADE = 2, 3
 #: The attributes that a copy makes for itself.
@@ -38,7 +42,7 @@ class TracedVectorEnv(WorldVectorEnv):
     do and the steps of the world become one compiled step, which takes a fraction of the time and has the same bits.
 
     Where that is not possible the rules are run on the arrays of all environments: with a method that carries something in place
-    of v, a system that depends on the time, has a control or friction that sticks, or a step of some thousand operations.
+    of v, a system that depends on the time, has a control or friction that sticks, or a step of more than 100 000 operations.
     """
 
     @staticmethod
@@ -108,7 +112,7 @@ class TracedVectorEnv(WorldVectorEnv):
             arrays = [(name, each.array.reshape(-1), each.row, each.least, each.most) for name, each in live.items()]
             core.watch(model, arrays)
             made.append(core)
-        self._play, self._look = made
+        (self._play, self._look), self._has_warned = made, False
 
     def __getstate__(self) -> dict[str, Any]:
         state = super().__getstate__() | {"_steps": np.array(self.steps), "_over": np.asarray(self._over, np.bool_)}
@@ -168,8 +172,13 @@ class TracedVectorEnv(WorldVectorEnv):
 
     def _run(self, name: str, *arguments: Any) -> Any:
         """A rule, of numbers of all environments or of symbols."""
-        function = getattr(type(self), name)
-        return run_function(rebound(function), f"{type(self).__name__}.{name}", False, *arguments)
+        function, rule = getattr(type(self), name), f"{type(self).__name__}.{name}"
+        returned = run_function(rebound(function), rule, False, *arguments)
+        return parts_of(returned, rule, *PARTS[name]) if name in PARTS else returned
+
+    def _expected(self, rule: str, part: str) -> str:
+        """The beginning of what is said of a rule that returned something else."""
+        return f"{type(self).__name__}.{rule}: expected {part}"
 
     def _state(self, v: Any, y: Any) -> tuple[Any, Any]:
         system = self.world.system
@@ -184,15 +193,17 @@ class TracedVectorEnv(WorldVectorEnv):
         """Push all."""
         world = self.world
         v, y, force = self._run("push", *self._state(*self.states), self._action(actions))
-        for block, new in ((world.v, v), (world.y, y), (world.force, force)):
+        if force is not None and world.force is None:
+            raise ArgumentError(f"{self._expected('push', 'no force')}, since the world has none; make a World(…, force=zeros)")
+        for part, block, new in (("v", world.v, v), ("y", world.y, y), ("a force", world.force, force)):
             if block is not None and new is not None:
-                block[...] = _values(new, block.shape)
+                block[...] = _values(new, block.shape, self._expected("push", part))
 
     def observe(self) -> Array:
         """Look at all."""
         seen = self._run("look", *self._state(*self.states))
         shape = (*self.one_observation.shape, self.num_envs)
-        return np.moveaxis(np.array(_values(seen, shape)), -1, 0)
+        return np.moveaxis(_values(seen, shape, self._expected("look", SEEN)), -1, 0)
 
     def begin_action(self, actions: Any) -> None:
         """Keep the states before the steps."""
@@ -202,31 +213,32 @@ class TracedVectorEnv(WorldVectorEnv):
         """Score all."""
         world = self.world
         state = self._run("settle", *self._state(*self.states))
-        for block, new in zip((world.v, world.y), state, strict=True):
-            block[...] = _values(new, block.shape)
+        for part, block, new in zip("vy", (world.v, world.y), state, strict=True):
+            block[...] = _values(new, block.shape, self._expected("settle", part))
         before = self._state(*self._before)
-        reward, ended = self._run("score", *self._state(*self.states), self._action(actions), before)
-        shape = (self.num_envs,)
-        return np.array(_values(reward, shape), np.float64), _values(ended, shape).astype(np.bool_)
+        score = self._run("score", *self._state(*self.states), self._action(actions), before)
+        each = (self.num_envs,)
+        reward, ended = (_values(x, each, self._expected("score", p)) for x, p in zip(score, PARTS["score"], strict=True))
+        return reward, ended.astype(np.bool_)
 
 
-def _items(value: Any) -> Any:
-    """What a rule returned as an array of objects: numbers of all environments, or symbols."""
+def _items(value: Any, shape: Any, part: str) -> Any:
+    """What a rule returned as an array of objects of this shape: numbers of all environments, or symbols."""
     items = objects(value)
     out = np.empty(items.size, dtype=object)
     for i, each in enumerate(items.flat):
         out[i] = value_of(each)
         if out[i] is None:
-            raise DTypeError(f"rules: expected numbers, got {type(each).__name__}")
-    return out.reshape(items.shape)
+            raise DTypeError(f"{part} of numbers, got {type(each).__name__}")
+    if items.shape != shape:
+        raise ShapeError(f"{part} of shape {shape}, got shape {items.shape}")
+    return out.reshape(shape)
 
 
-def _values(value: Any, shape: Any) -> Array:
+def _values(value: Any, shape: Any, part: str) -> Array:
     """What a rule returned, as an array whose last axis is that of the environments."""
-    items = _items(value)
-    if items.shape != shape[:-1]:
-        raise ShapeError(f"rules: expected numbers of shape {shape[:-1]} of an environment, got shape {items.shape}")
-    return np.stack([np.broadcast_to(each, shape[-1:]) for each in items.flat]).reshape(shape)
+    items = _items(value, shape[:-1], part)
+    return np.array([np.broadcast_to(each, shape[-1:]) for each in items.flat], np.float64).reshape(shape)
 
 
 def _traced(env: TracedVectorEnv, makes_steps: bool) -> tuple[_core.Tape, list[Any]]:
@@ -246,10 +258,8 @@ def _traced(env: TracedVectorEnv, makes_steps: bool) -> tuple[_core.Tape, list[A
     start = v, y
     waits = bits.less(zero, over) if makes_steps and env.begins_at_next_step else None
 
-    def symbols(value: Any, shape: Any) -> Any:
-        items = _items(value)
-        if items.shape != shape:
-            raise ShapeError(f"rules: expected numbers of shape {shape} of an environment, got shape {items.shape}")
+    def symbols(value: Any, shape: Any, rule: str, part: str) -> Any:
+        items = _items(value, shape, env._expected(rule, part))
         flat = [_symbol(tape, each, one, zero) for each in items.flat]
         out = np.empty(len(flat), dtype=object)
         out[:] = flat
@@ -259,17 +269,20 @@ def _traced(env: TracedVectorEnv, makes_steps: bool) -> tuple[_core.Tape, list[A
     if makes_steps:
         for _ in range(env.substeps):
             pushed_v, pushed_y, force = env._run("push", *env._state(v, y), scalars(action, len(shape)))
-            v, y = symbols(pushed_v, system.v_shape), symbols(pushed_y, system.y_shape)
+            v, y = symbols(pushed_v, system.v_shape, "push", "v"), symbols(pushed_y, system.y_shape, "push", "y")
             around = list(parts)
             if force is not None:
-                around.append((Force(len(system.v_shape)), {FORCE: symbols(force, system.v_shape)}))
+                around.append((Force(len(system.v_shape)), {FORCE: symbols(force, system.v_shape, "push", "a force")}))
             s = wrapped(system.reference(h, **own), h, around)
             v, y = contact.step(method.steps, s, 0, tape.time(), h, v, y)
         settled = env._run("settle", *env._state(v, y))
-        v, y = symbols(settled[0], system.v_shape), symbols(settled[1], system.y_shape)
+        v, y = symbols(settled[0], system.v_shape, "settle", "v"), symbols(settled[1], system.y_shape, "settle", "y")
         before = env._state(*start)
         score = env._run("score", *env._state(v, y), scalars(action, len(shape)), before)
-        reward, ended = (symbols(each, ())[()] for each in score)
+        reward, ended = (symbols(each, (), "score", part)[()] for each, part in zip(score, PARTS["score"], strict=True))
+        # x − x is NaN if x is not finite, and NaN is not less than 1.
+        lost = sum((x - x for x in [*v.flat, *y.flat]), start=zero)
+        ended = bits.where(bits.less(lost, one), ended, one)
         count = count + one
         if env.max_episode_steps is not None:
             cut = bits.where(bits.less(count, tape.number(float(env.max_episode_steps))), zero, one)
@@ -277,7 +290,7 @@ def _traced(env: TracedVectorEnv, makes_steps: bool) -> tuple[_core.Tape, list[A
             v, y = (_chosen(waits, old, new) for old, new in zip(start, (v, y), strict=True))
             count, reward, ended, cut = (bits.where(waits, zero, each) for each in (count, reward, ended, cut))
         over = bits.where(bits.less(zero, ended), one, cut)
-    seen = symbols(env._run("look", *env._state(v, y)), env.one_observation.shape)
+    seen = symbols(env._run("look", *env._state(v, y)), env.one_observation.shape, "look", SEEN)
     space = env.one_observation
     bounded = [
         bits.where(bits.less(x, tape.number(float(low))), tape.number(float(low)), x) if np.isfinite(low) else x

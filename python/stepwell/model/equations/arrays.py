@@ -11,6 +11,7 @@ import numpy as np
 
 from ...errors import TraceError
 from ...reference import functions, trig
+from ...reference.functions.logarithms import logaddexp
 from .values import (
     ARRAY_FUNCTIONS,
     COMPARISONS,
@@ -34,6 +35,7 @@ _OWN = (
 )
 ELEMENTWISE: dict[str, Callable[..., Any]] = {name: getattr(functions, name) for name in _OWN.split()}
 ELEMENTWISE |= {
+    "logaddexp": logaddexp,
     "absolute": functions.abs,
     "abs": functions.abs,
     "fabs": functions.abs,

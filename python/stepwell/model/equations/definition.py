@@ -219,7 +219,7 @@ def _from_signature(function: Callable[..., Any], state: int) -> dict[str, Any]:
     positional = [each for each in arguments if each.kind in (each.POSITIONAL_ONLY, each.POSITIONAL_OR_KEYWORD)]
     if len(positional) < state or any(each.default is not each.empty for each in positional[:state]):
         first_order = "; for ẏ = f(t, y) write sw.system(order=1)" if state == 3 and len(positional) == 2 else ""
-        raise ArgumentError(f"{name}: expected a function {expected}, got ({', '.join(map(str, arguments))}){first_order}")
+        raise ArgumentError(f"{name}: expected a function {expected}, got {signature}{first_order}")
     checks.argument_order(name, function, ("t", "v", "y") if state == 3 else ("t", "y"), signature)
     parameters = {}
     for each in arguments:

@@ -3,6 +3,7 @@
 from typing import Any, Protocol
 
 from ...base.arrays import Array, Shape
+from ...reference.mass import Mass
 
 
 class TracedFunction(Protocol):
@@ -17,6 +18,10 @@ class TracedFunction(Protocol):
     v_shape: Shape
     y_shape: Shape
     own_shapes: dict[str, Any]
+
+    @property
+    def mass_matrix(self) -> Mass | None:
+        """The mass matrix if equations are algebraic."""
 
     @property
     def name(self) -> str:

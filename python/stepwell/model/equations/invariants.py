@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ... import _core
-from ...errors import ArgumentError
+from ...errors import ArgumentError, UnsupportedError
 from ...reference.marks import recording
 from ...reference.tape.replay import Replay
 from .function import TracedFunction
@@ -86,6 +86,14 @@ class Traced:
         from ...reference.tape.modes import gradient  # slow to import, and only controls and projections need it
 
         along = gradient(self._tape, self._value, self._state, self._marks)
+        # What algebraic equations determine follows from the others.
+        mass, zero = self.equations.mass_matrix, self._tape.number(0.0)
+        for place in () if mass is None else (number for number, row in enumerate(mass.rows) if not row):
+            if along[place].id != zero.id:
+                raise UnsupportedError(
+                    f"control: expected an invariant of numbers that have a rate, and {self.invariant.name} of "
+                    f"{self.equations.name} depends on y[{place}], which an algebraic equation determines"
+                )
         square = along[0] * along[0]
         for each in along[1:]:
             square = square + each * each

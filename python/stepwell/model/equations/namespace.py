@@ -96,6 +96,7 @@ def rebound(function: Any, seen: dict[int, Any] | None = None) -> Any:
     closure = tuple(CellType() for _ in function.__closure__ or ())
     again = FunctionType(function.__code__, names, function.__name__, function.__defaults__, closure)
     again.__kwdefaults__ = function.__kwdefaults__
+    vars(again).update(vars(function))
     seen[id(function)] = again
 
     def meant(value: Any) -> Any:

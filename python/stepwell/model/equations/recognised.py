@@ -1,16 +1,16 @@
 """Recognising functions that were traced before, without running them.
 
 Two functions compute the same if their code is equal and so is everything that the code may read: captured variables, globals by
-the names in it, defaults, and the functions among these likewise. Numbers and arrays count by value, so a function whose global
-was changed since is another one. A function that reads something that may change unseen, such as an object or a module other
-than NumPy and ``math``, is not recognised, and is traced again.
+the names in it, defaults, attributes, and the functions among these likewise. Numbers and arrays count by value, so a function
+whose global was changed since is another one. A function that reads something that may change unseen, such as an object or a
+module other than NumPy and ``math``, is not recognised, and is traced again.
 """
 
 from __future__ import annotations
 
 import dis
 import math
-from functools import lru_cache
+from functools import lru_cache, partial
 from types import BuiltinFunctionType, CodeType, FunctionType, ModuleType
 from typing import Any
 
@@ -69,6 +69,8 @@ def _of(value: Any, seen: list[Any]) -> Any:
         return kind, *(_of(each, seen) for each in value)
     if kind is dict and len(value) <= MOST_ITEMS:
         return kind, *((_of(key, seen), _of(each, seen)) for key, each in value.items())
+    if kind is partial:
+        return kind, *(_of(each, seen) for each in (value.func, value.args, value.keywords))
     if isinstance(value, (BuiltinFunctionType, np.ufunc)) or any(value is each for each in MODULES):
         return id(value)
     # NumPy's functions that are written in Python or dispatch to other types.
@@ -96,7 +98,7 @@ def _of_function(function: FunctionType, seen: list[Any]) -> Any:
     except ValueError:  # an empty cell
         raise Unknown from None
     defaults = _of(function.__defaults__, seen), _of(function.__kwdefaults__, seen)
-    return function.__code__, tuple(read), captured, defaults
+    return function.__code__, tuple(read), captured, defaults, _of(vars(function), seen)
 
 
 def _is_pure(value: Any) -> bool:

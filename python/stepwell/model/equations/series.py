@@ -15,14 +15,14 @@ from ...reference.marks import Marks, mark, recording
 from ...reference.tape.replay import Replay
 from .function import TracedFunction
 
-Functions = list[tuple[Any, list[tuple[Any, Any]], tuple[float, float] | None]]
+Functions = list[tuple[Any, list[tuple[Any, Any]], tuple[float, float] | None, bool]]
 
 
 def derivatives_of_functions(tape: Any, marks: Marks) -> Functions:
-    """The marked values on a tape, each with its bounds, the values that it depends on and its derivatives by them.
+    """The marked values on a tape, each with its derivatives by the values that it depends on, bounds, and whether it has pieces.
 
     Derivatives join the tape. If a derivative is a function itself, as the cosine is that of the sine, its own derivative joins,
-    too. A remainder a − b·⌊a/b⌋ also depends on a whole number, which shows that it is made of pieces.
+    too.
     """
     functions: Functions = []
     with recording(marks):
@@ -36,10 +36,7 @@ def derivatives_of_functions(tape: Any, marks: Marks) -> Functions:
                 value, wanted = tape.value(id), [isinstance(each, _core.Symbol) for each in mark.arguments]
                 factors = zip(mark.arguments, series.factors(mark, value, wanted), strict=True)
                 by = [(of, tape.number(by) if isinstance(by, float) else by) for of, by in factors if by is not None]
-                if mark.name in ("mod", "remainder"):
-                    a, b = (each if isinstance(each, _core.Symbol) else tape.number(each) for each in mark.arguments)
-                    by.append(((a / b).floor(), -b))
-                functions.append((value, by, series.BRANCHES.get(mark.name)))
+                functions.append((value, by, series.BRANCHES.get(mark.name), mark.name in series.PIECES))
     return functions
 
 
@@ -112,6 +109,7 @@ class MarkedReplay(Replay):
         """The values of one member."""
         values: dict[int, Any] = {}
         book = next(each.book for each in (*t, *state) if isinstance(each, series.Series))
+        book.ends = True
         for line in self.needed:
             name, of, extra = self.lines[line]
             function = self.functions.get(line)

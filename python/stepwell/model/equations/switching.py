@@ -7,11 +7,13 @@ it is solved for the time by inverting the operations one after the other, from 
 must stand once in a comparison, or once in each of some factors whose product is compared with zero.
 
 Steps would miss a narrow bell or ramp, too, though it is smooth. It has a middle, at which the argument of an even power, an
-exponential or the like is zero. A step that ends there does not miss it.
+exponential or the like is zero. A step that ends there does not miss it. Bells that repeat count if they are narrow: steps that
+end at each turn of a wave would be for nothing.
 """
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Iterator, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -19,6 +21,7 @@ import numpy as np
 
 from ...base.arrays import Array
 from ...base.checks import concatenated
+from ...errors import AccuracyWarning
 from ...reference.bits import DOUBLE
 from ...reference.marks import Mark
 from ...reference.tape.lines import Operation, needed
@@ -27,10 +30,13 @@ from ...reference.tape.replay import Replay
 from .series import Line
 
 if TYPE_CHECKING:
-    from .series import OnSeries
+    from .series import MarkedReplay, OnSeries
 
-#: A condition that switches more often than this within a run is not searched: steps cannot miss all of its pulses.
-MOST_PERIODS = 4096
+#: The most times of a condition, of all members together, that are searched.
+MOST_TIMES = 1 << 21
+#: Bells that repeat are narrow if less than this share of a period is further than that share of their height from what they are
+#: for most of it, by so many samples.
+NARROW, HEIGHT, SHAPE_SAMPLES = 0.5, 0.05, 129
 #: The range of the argument of a periodic function is that of so many samples.
 ARGUMENT_SAMPLES = 33
 #: An inverted time is off by roundings on the way, and rates switch where their own roundings let them: the switch is searched
@@ -52,13 +58,15 @@ def numbers_of(parameters: dict[str, Any], own_axes: Callable[[str], int]) -> li
 class Switch(NamedTuple):
     """Rates change where ``left`` equals ``right``, or with a period where they differ by whole periods.
 
-    Each is a line or a number. ``smooth`` is whether that is the middle of a bell or a ramp.
+    Each is a line or a number. ``smooth`` is whether that is the middle of a bell or a ramp, and ``shapes`` are the lines that
+    have its shape if it repeats.
     """
 
     left: Any
     right: Any
     period: Any = None
     smooth: bool = False
+    shapes: tuple[int, ...] = ()
 
 
 #: Where functions jump, by their arguments.
@@ -81,7 +89,7 @@ KINKS: dict[str, Callable[..., list[Switch]]] = {
 }
 #: Functions that make a bell or a ramp whose middle is where their first argument is zero.
 WITH_MIDDLE = {"exp", "exp2", "expm1", "tanh", "cosh", "arctan", "hypot", "power"}
-#: Periodic functions, whose values are no single bell or ramp.
+#: Periodic functions, of which bells and ramps repeat.
 REPEATING = {"sin", "cos", "tan", "mod", "remainder"}
 
 #: The inverses of functions of one argument: the arguments within one period at which they have a value, and the period.
@@ -146,7 +154,13 @@ class Switches:
         values = self._of_values(rates.operations.places)
         switches = [each for line in rates.operations.needed for each in self._jumps(line)]
         switches += [each for line in rates.operations.needed if line in values for each in self._bends(line)]
+        #: Whether there are pieces between which the time alone chooses.
+        self.by_time = any(self._by_time(each) for each in switches if not each.smooth)
+        shapes = self._shapes(rates.operations)
+        switches = [each._replace(shapes=shapes.get(each.left, ())) if self._repeated(each) else each for each in switches]
         solvable = [each for each in switches if self._solvable(each)]
+        #: Whether some are not solved for.
+        self.unsolvable = any(not (each.smooth or self._solvable(each)) for each in switches)
         #: The constants of the function with which the time itself is compared, and all other switches.
         self.constants = np.unique([time for each in solvable if (time := self._constant_time(each)) is not None])
         self.switches = [each for each in solvable if self._constant_time(each) is None]
@@ -199,11 +213,39 @@ class Switches:
         base, exponent = self.powers[line]
         return [Switch(base, 0.0, smooth=True)] if exponent % 2 == 0 else []
 
+    def _by_time(self, switch: Switch) -> bool:
+        changes = [self.changes[each] for each in switch[:3] if isinstance(each, Line)]
+        return any(changes) and None not in changes
+
     def _solvable(self, switch: Switch) -> bool:
-        lines = [each for each in switch[:3] if isinstance(each, Line)]
-        changes = [self.changes[each] for each in lines]
-        once = any(changes) and None not in changes and not (isinstance(switch.period, Line) and changes[-1])
-        return once and not (switch.smooth and any(self.repeats[each] for each in lines))
+        once = self._by_time(switch) and not (isinstance(switch.period, Line) and self.changes[switch.period])
+        return once and bool(switch.shapes or not self._repeated(switch))
+
+    def _repeated(self, switch: Switch) -> bool:
+        return switch.smooth and any(self.repeats[each] for each in switch[:2] if isinstance(each, Line))
+
+    def _shapes(self, rates: MarkedReplay) -> dict[int, tuple[int, ...]]:
+        """By lines of the time, those that are the last ones of the time alone, behind a function with a middle or a quotient."""
+        readers: dict[int, list[int]] = {}
+        for line in rates.needed:
+            mark = self.functions.get(line)
+            of = self.tape[line].of if mark is None else [each for each in mark.arguments if isinstance(each, Line)]
+            for each in of:
+                readers.setdefault(each, []).append(line)
+        shapes: dict[int, set[int]] = {}
+        bends: dict[int, bool] = {}
+        for line in reversed(rates.needed):
+            if not self.changes[line] or self.tape[line].name in COMPARISONS:
+                continue
+            behind = [each for each in readers.get(line, []) if self.changes[each]]
+            is_last = line in rates.places or any(self.changes[each] is None for each in readers.get(line, []))
+            shapes[line] = {line} if is_last else set()
+            shapes[line].update(*(shapes.get(each, ()) for each in behind))
+            mark = self.functions.get(line)
+            own = self.tape[line].name == "divide" if mark is None else mark.name in WITH_MIDDLE
+            bends[line] = own or any(bends.get(each, False) for each in behind)
+        bent = {line for line in shapes if any(bends.get(each, False) for each in (line, *readers.get(line, [])))}
+        return {line: tuple(sorted(shapes[line])) for line in bent}
 
     def times(self, numbers: Sequence[Array | None], begin: float, end: float) -> Array:
         """The times at which members switch, from ``begin`` to ``end`` and some around, shape (times, *batch); NaN is no time.
@@ -215,6 +257,13 @@ class Switches:
         with np.errstate(all="ignore"):
             solving = Solving(self, numbers, begin, end)
             times = [self.constants, *(times for switch in self.switches for times in solving.of(switch))]
+        if solving.too_many:
+            warnings.warn(
+                f"the rates switch by the time more than {MOST_TIMES} times in this run, so steps do not end at each, and pulses "
+                f"may be missed; make several runs, one after the other, or give max_step= below the shortest pulse",
+                AccuracyWarning,
+                stacklevel=2,
+            )
         return concatenated(times)
 
 
@@ -226,14 +275,17 @@ class Solving:
         self.changes, self.powers = switches.changes, switches.powers
         self.numbers = numbers
         self.axes = max((each.ndim for each in numbers if each is not None), default=0)
+        #: Whether a condition switches too often to be searched, and whether one has no inverse here.
+        self.too_many = self.unsolved = False
         self.samples = np.linspace(begin, end, ARGUMENT_SAMPLES).reshape(-1, *self.axes * (1,))
 
     def of(self, switch: Switch) -> Iterator[Array]:
         """The times of a switch."""
-        left, right, period, smooth = switch
+        left, right, period, smooth, shapes = switch
         if not self._changing(left):
             left, right = right, left
         if self._changing(right):
+            self.unsolved |= not smooth
             return
         values = self._constant(right)[np.newaxis]
         if period is not None:
@@ -242,9 +294,11 @@ class Solving:
         while waiting:
             line, values = waiting.pop()
             if self.tape[line].name == "time":
-                yield values if smooth else self._exact(values, switch)
+                yield self._narrow(values, shapes) if shapes else values if smooth else self._exact(values, switch)
             else:
-                waiting += self._inverted(line, values)
+                operands = list(self._inverted(line, values))
+                self.unsolved |= not (smooth or operands)
+                waiting += operands
 
     def _inverted(self, line: Any, values: Array) -> Iterator[tuple[Any, Array]]:
         """The operands of a line that depend on the time, with the values that they have where the line has one of these."""
@@ -291,11 +345,30 @@ class Solving:
         seen, period = self._at(line, self.samples), np.abs(period)
         places = [(edge - values) / period for edge in (seen.min(axis=0), seen.max(axis=0))]
         first, last = np.floor(np.nanmin(places)) - 1.0, np.ceil(np.nanmax(places)) + 1.0
-        if not 0.0 <= last - first <= MOST_PERIODS:
+        if not 0.0 <= (last - first) * max(np.size(values), np.size(period)) <= MOST_TIMES:
+            self.too_many |= bool(last > first)
             return values[:0]
         every = np.arange(first, last + 1.0).reshape(-1, *np.ndim(values) * (1,))
         periodic = values + period * every
         return periodic.reshape(-1, *periodic.shape[2:])
+
+    def _narrow(self, times: Array, shapes: Sequence[int]) -> Array:
+        """These middles of bells or ramps that repeat, where they are narrow, else NaN."""
+        ordered = np.sort(times, axis=0)
+        apart = np.diff(ordered, axis=0)
+        apart[~(apart > HEIGHT * np.nanmax(apart, axis=0, initial=0.0))] = np.inf
+        if not len(apart):
+            return times
+        period = apart.min(axis=0)
+        middle = ordered[len(ordered) // 2]
+        around = np.linspace(-0.5, 0.5, SHAPE_SAMPLES).reshape(-1, *(1,) * period.ndim)
+        narrow = np.zeros(period.shape, bool)
+        for line in shapes:
+            values = self._at(line, middle + period * around)
+            height = HEIGHT * (values.max(axis=0) - values.min(axis=0))
+            away = np.abs(values - np.median(values, axis=0)) > height
+            narrow |= (away.mean(axis=0) < NARROW) & (height > 0.0)
+        return np.where(narrow, times, np.nan) if narrow.any() else times[:0]
 
     def _exact(self, times: Array, switch: Switch) -> Array:
         """These times to the last bits: where the piece changes, if it changes once nearby."""

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ...base import checks
 from ...base.arrays import Array as Numbers
 from ...base.arrays import Shape
 from ...errors import REFUSED, TraceError
@@ -194,14 +195,19 @@ class Equations:
         """The switching times that depend on nothing; None if they depend on parameters or the run, or were not computed yet."""
         return None if self._switches is None or self._switches.switches else self._switches.constants
 
-    def switching_times(self, values: dict[str, Any], begin: float, end: float) -> Numbers:
-        """The times at which the rates change from one piece to another whatever the state is, shape (times, *batch)."""
+    def switching(self, values: dict[str, Any]) -> tuple[Switches, Any]:
+        """The switches of the rates, and the numbers of parameters for which they are solved."""
         from .switching import Switches, numbers_of
 
         numbers = numbers_of(values, self.own_axes)
         if self._switches is None:
             self._switches = Switches(self._of_series(values), numbers)
-        return self._switches.times(numbers, begin, end)
+        return self._switches, numbers
+
+    def switching_times(self, values: dict[str, Any], begin: float, end: float) -> Numbers:
+        """The times at which the rates change from one piece to another whatever the state is, shape (times, *batch)."""
+        switches, numbers = self.switching(values)
+        return switches.times(numbers, begin, end)
 
     def of_state(self, invariant: Invariant, t: Any, v: Numbers, y: Numbers, values: dict[str, Any]) -> Any:
         """The value of an invariant for a state of symbols: one symbol, or a known number."""
@@ -339,6 +345,8 @@ def _not_negative(numbers: Any) -> Any:
 
 def _in_words(error: BaseException) -> str:
     """Python's message, or a clearer one where the function uses a scalar or an array as something else."""
+    if "'complex'" in str(error):
+        return f"expected real numbers, got a complex one; {checks.COMPLEX}"
     if match := re.fullmatch(r"(cannot unpack non-iterable )?'?(Scalar|Array)'? object(.*)", str(error)):
         if "not callable" in match[3]:
             return "y is the state at t, and no function of the time: delays such as y(t − τ) are not here"

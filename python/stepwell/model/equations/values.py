@@ -14,6 +14,7 @@ from typing import Any, NoReturn
 
 import numpy as np
 
+from ...base import checks
 from ...errors import TraceError
 from ...reference import bits, functions
 
@@ -110,7 +111,8 @@ def array(value: Any) -> Array:
     items = objects(value)
     for each in items.flat:
         if value_of(each) is None:
-            raise TraceError(f"expected numbers in an array, got {type(each).__name__}")
+            remedy = f"; {checks.COMPLEX}" if isinstance(each, complex) else ""
+            raise TraceError(f"expected numbers in an array, got {type(each).__name__}{remedy}")
     return Array(items)
 
 

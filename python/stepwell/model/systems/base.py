@@ -267,7 +267,7 @@ class System(Immutable, ValueEquality, ABC):
         return 0
 
     def surrounded(self, part: Part) -> Self:
-        """This system with a further part around its equations, which replaces one of the same kind.
+        """This system with a further part around its equations, which replaces one of the same kind; controllers go together.
 
         Args:
             part: something that acts on the system, such as a spring to a moving anchor; see docs/developing/adding.md.
@@ -279,6 +279,7 @@ class System(Immutable, ValueEquality, ABC):
         if not isinstance(part, Part):
             raise DTypeError(f"part: expected something around a system, got {checks.short(part)} ({type(part).__name__})")
         part.check(self)
+        part = part.beside(self.part(part.kind))
         return changed(
             self,
             around=self._around_with(part),
@@ -330,6 +331,11 @@ class System(Immutable, ValueEquality, ABC):
         """The quantities that the core can record beside the states, with the shape of each; the reference defines them."""
         recorded: dict[str, Quantity] = getattr(self.reference, "quantities", {})
         return {name: each.shape(self.y_shape[-1] if self.y_shape else 1) for name, each in recorded.items()}
+
+    def recorded_shapes(self) -> dict[str, Shape]:
+        """The quantities, and what a sampled controller sets, which only a run can record while it steps."""
+        held = {} if self.controller is None else {each.name: each.shape for each in self.controller.targets(self)}
+        return held | self.quantities
 
     def energy(self, v: Array, y: Array) -> Array:
         """The energy of states with the blocks' axes first and axes of the batch last.
@@ -468,6 +474,11 @@ class System(Immutable, ValueEquality, ABC):
     @property
     def reads_time(self) -> bool:
         """Whether its equations depend on the time otherwise than through inputs."""
+        return False
+
+    @property
+    def switches_by_time(self) -> bool:
+        """Whether its rates are made of pieces between which the time alone chooses."""
         return False
 
     def switching_times(self, begin: float, end: float) -> Array:

@@ -13,7 +13,7 @@ from ...base import checks
 from ...base.arrays import Array, Shape
 from ...base.immutable import changed
 from ...base.reprs import counted
-from ...errors import ArgumentError, ShapeError, UnsupportedError
+from ...errors import ArgumentError, DTypeError, ShapeError, UnsupportedError
 from ...reference.product import times
 from ...reference.systems.linear import Linear as Reference
 from ..inputs import Input, Pulse, as_input
@@ -393,6 +393,10 @@ def of_rates(argument: str, system: System) -> Realisation:
 
 
 def _square(A: Any) -> Array:
+    if any(all(hasattr(A, each) for each in names) for names in ("AB", ("num", "den"), ("zeros", "poles"))):
+        raise DTypeError(
+            f"A: expected a matrix, got a system, {type(A).__name__}; LinearSystem.of({type(A).__name__}(…)) takes it"
+        )
     array = checks.numbers("A", A)
     if array.ndim < 2 or array.shape[0] != array.shape[1] or array.shape[0] == 0:
         raise ShapeError(f"A: expected shape (n, n, batch…) with at least one state, got {array.shape}")

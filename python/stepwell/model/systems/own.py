@@ -6,7 +6,7 @@ import copy
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import nullcontext
 from math import prod
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from ...base import checks
 from ...base.arrays import Array, Shape
 from ...base.immutable import changed, complete
 from ...errors import ShapeError, TraceError, UnsupportedError
+from ...reference.around import Bound
 from ...reference.marks import Marks, recording
 from ...reference.mass import Mass
 from ...reference.systems.equations import Equations as Reference
@@ -408,14 +409,24 @@ class OwnSystem(System):
         """Whether the function depends on the time."""
         return bool(self._retraced()._core.reads_time)
 
+    @property
+    def switches_by_time(self) -> bool:
+        """Whether comparisons and the like of the time choose between pieces of the function."""
+        bound = self._retraced()
+        assert bound.equations is not None
+        return bound.reads_time and bound.equations.switching(bound._of_function())[0].by_time
+
+    def _of_function(self) -> dict[str, Any]:
+        """The parameters of the function itself, as numbers and inputs."""
+        return {name: value for name, value in self.own_parameters(self.batch).items() if name in self.parameters_given}
+
     def switching_times(self, begin: float, end: float) -> Array:
         """The times at which comparisons of the function change, for the parameters of each member."""
         bound = self._retraced()
         assert bound.equations is not None
         if (known := bound.equations.constant_switching_times) is not None:
             return known
-        parameters = {name: value for name, value in bound.own_parameters(bound.batch).items() if name in self.parameters_given}
-        return bound.equations.switching_times(parameters, begin, end)
+        return bound.equations.switching_times(bound._of_function(), begin, end)
 
     def _series_rates(self) -> Any:
         """The rates as operations, with the derivatives of the functions among them."""
@@ -436,6 +447,12 @@ class OwnSystem(System):
         if bound._digest is None or bound._digest[0] is not bound._core:
             bound._digest = bound._core, digest(bound)
         return bound._digest[1]
+
+    def of_members(self, batch: Shape, own: dict[str, Any], parts: list[Bound]) -> Self:
+        """This system for some members of a batch, which have the operations of all."""
+        some = super().of_members(batch, own, parts)
+        complete(some, _core=self._core, _with_functions=self._with_functions)
+        return some
 
     def _retraced(self) -> OwnSystem:
         """This system with its operations, which an unpickled copy lacks."""
@@ -464,7 +481,12 @@ class OwnSystem(System):
                 f"energy: {self!r} has no invariant of that name; declare one: @{self.definition.name}.invariant above "
                 f"def energy({'v, y' if self.definition.has_v else 'y'}, *, …)"
             )
-        return np.asarray(self.reference_at_step(1.0, np.shape(y)[len(self.y_shape) :]).record("energy", v, y))
+        energy = np.asarray(self.reference_at_step(1.0, np.shape(y)[len(self.y_shape) :]).record("energy", v, y))
+        if "energy" not in self.quantities:  # since a controller sets what it reads
+            raise UnsupportedError(
+                f"energy: that of {self!r} reads a parameter that changes with the time; compute it from v and y"
+            )
+        return energy
 
     def controlled(self, control: Any, v: Array, y: Array, dt: float) -> OwnSystem:
         """This system under a control of an invariant; without a target of its own, the control keeps the value of this state."""
@@ -496,10 +518,10 @@ class OwnSystem(System):
         return checks.known("control", name, self.definition.invariants)
 
     def _keeping(self, name: str, control: Any) -> OwnSystem:
-        if self.mass_matrix is not None:
+        if self.mass_matrix is not None and isinstance(control, Control):
             raise UnsupportedError(
-                f"control: {control!r} moves the state along the gradient of an invariant, and the algebraic equations of "
-                f"{self!r} do not hold there"
+                f"control: {control!r} pushes rates along the gradient of an invariant, and the algebraic equations of {self!r} "
+                f"give no rate; use Projection({name!r}), which moves the state after each step"
             )
         if self.has_stick_friction:
             raise UnsupportedError(

@@ -195,8 +195,8 @@ def series(first: Realisation, second: Realisation) -> Realisation:
     return _joined(
         [
             [first.A, None, first.B],
-            [_times(second.B, first.C), second.A, _times(second.B, first.D)],
-            [_times(second.D, first.C), second.C, _times(second.D, first.D)],
+            [times(second.B, first.C), second.A, times(second.B, first.D)],
+            [times(second.D, first.C), second.C, times(second.D, first.D)],
         ],
         (first, second),
         first.x,
@@ -214,7 +214,7 @@ def parallel(first: Realisation, second: Realisation) -> Realisation:
     elif any(each is not None for each in second.x) and second.x != first.x:
         raise ArgumentError("parallel: expected one input for both systems, got two; give x to the first one only")
     return _joined(
-        [[first.A, None, first.B], [None, second.A, second.B], [first.C, second.C, _sum(first.D, second.D)]], (first, second), x
+        [[first.A, None, first.B], [None, second.A, second.B], [first.C, second.C, sum_of(first.D, second.D)]], (first, second), x
     )
 
 
@@ -229,17 +229,17 @@ def feedback(forward: Realisation, back: Realisation, sign: int) -> Realisation:
             f"got {back.inputs} and {back.outputs}"
         )
     _undriven("feedback", "is the output of the system forward", back)
-    loop = _solved(_times(forward.D, back.D), sign)
-    C = (_times(loop, forward.C), float(sign) * _times(loop, _times(forward.D, back.C)))
-    D = _times(loop, forward.D)
+    loop = _solved(times(forward.D, back.D), sign)
+    C = (times(loop, forward.C), float(sign) * times(loop, times(forward.D, back.C)))
+    D = times(loop, forward.D)
     # The inputs of the system forward: e = x + sign·(C₂·s₂ + D₂·z)
-    e = (float(sign) * _times(back.D, C[0]), float(sign) * _sum(back.C, _times(back.D, C[1])))
+    e = (float(sign) * times(back.D, C[0]), float(sign) * sum_of(back.C, times(back.D, C[1])))
     unit = np.eye(forward.inputs).reshape(*forward.D.shape[1:2] * 2, *(1,) * (D.ndim - 2))
-    of_x = _sum(unit, float(sign) * _times(back.D, D))
+    of_x = sum_of(unit, float(sign) * times(back.D, D))
     return _joined(
         [
-            [_sum(forward.A, _times(forward.B, e[0])), _times(forward.B, e[1]), _times(forward.B, of_x)],
-            [_times(back.B, C[0]), _sum(back.A, _times(back.B, C[1])), _times(back.B, D)],
+            [sum_of(forward.A, times(forward.B, e[0])), times(forward.B, e[1]), times(forward.B, of_x)],
+            [times(back.B, C[0]), sum_of(back.A, times(back.B, C[1])), times(back.B, D)],
             [*C, D],
         ],
         (forward, back),
@@ -283,14 +283,16 @@ def _pair(a: Array, b: Array) -> tuple[Array, Array]:
     return aligned(a, 2, batch), aligned(b, 2, batch)
 
 
-def _times(a: Array, b: Array) -> Array:
+def times(a: Array, b: Array) -> Array:
+    """The product of two matrices over their batch."""
     a, b = _pair(a, b)
     if not a.shape[1]:
         return np.zeros((len(a), b.shape[1], *(1,) * (a.ndim - 2)))
     return product(a, b)
 
 
-def _sum(a: Array, b: Array) -> Array:
+def sum_of(a: Array, b: Array) -> Array:
+    """The sum of two matrices over their batch."""
     a, b = _pair(a, b)
     return a + b
 

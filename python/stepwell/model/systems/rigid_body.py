@@ -17,6 +17,10 @@ from .base import System, shown
 #: A moment may exceed the sum of the others by this share of the sum, since in a flat body both are equal but for rounding.
 FLAT_SLACK = 1e-12
 
+#: No step keeps the length of a quaternion, and the attitude does not depend on it; a shorter one is told before it vanishes. One
+#: that became very long is told as growth.
+LEAST_LENGTH = 1e-3
+
 AXES = 3
 
 
@@ -131,9 +135,20 @@ class RigidBody(System):
         return bool(self.given_inputs()) or (self.damping is not None and bool((self.damping != 0.0).any()))
 
     def doubt(self, y: Array) -> tuple[str, Any] | None:
-        """A message if a quaternion is zero, which is no attitude."""
+        """A message if a quaternion is zero, or very short in the first or last of these states."""
         zero = (y == 0.0).all(axis=1)
-        return ("a quaternion is zero, which is no attitude", zero.any(axis=0)) if zero.any() else None
+        if zero.any():
+            return "a quaternion is zero, which is no attitude", zero.any(axis=0)
+        with np.errstate(all="ignore"):
+            length = np.sqrt((y[[0, -1]] ** 2).sum(axis=1))
+            wrong = length < LEAST_LENGTH
+        if not wrong.any():
+            return None
+        text = (
+            f"a quaternion has the length {length[wrong][0]:.3g} in place of 1, which many long steps make of it if it is not "
+            f'kept; control=NormControl(1.0) or Projection("norm") keeps it'
+        )
+        return text, wrong.any(axis=0)
 
 
 def _vector(argument: str, numbers: Array) -> Array:

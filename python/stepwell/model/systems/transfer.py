@@ -20,8 +20,8 @@ class TransferFunction(LinearSystem):
     """Z(s)/X(s) = num(s)/den(s), with one input and one output; equal degrees go through D (§3).
 
     It is the linear system in controllable form: the states are the derivatives of an intermediate variable w, with
-    den(d/dt)·w = x, the highest derivative first, and w itself; the output is num(d/dt)·w. Of second degree they are a velocity
-    and a coordinate.
+    (den/den[0])(d/dt)·w = x, the highest derivative first, and w itself. So a state is not the output: that is C·state + D·x,
+    which is ``run.z``. Of second degree the states are a velocity and a coordinate.
 
     Args:
         num: the coefficients of the numerator, highest power first as in SciPy, shape (degree + 1, *batch), or a number. Its

@@ -6,12 +6,27 @@ decides after them. ``runs`` goes from one saved time to the next. What is toler
 
 from .attempts import Attempted, Backward, Pair, Stretched, Tried, tried
 from .controller import MAX_FACTOR, MIN_FACTOR, MOVES, SINGLE_MOVES, Outlook, Pace
-from .pace import ONSET, OUTSIDE, ROUNDING, SINGLE_ROUNDING, attempt, begin, decided, judged, over, tolerated
+from .pace import (
+    LEAST_PART,
+    ONSET,
+    OUTSIDE,
+    ROUNDING,
+    SINGLE_ROUNDING,
+    attempt,
+    begin,
+    decided,
+    judged,
+    over,
+    rounded,
+    small_of,
+    tolerated,
+)
 from .runs import BUDGET, NOT_FINITE, OK, UNDERFLOW, Jumps, Outcome, run, waiting
 from .sizes import largest, longer, numbers_in, sizes, stacked, total
 
 __all__ = [
     "BUDGET",
+    "LEAST_PART",
     "MAX_FACTOR",
     "MIN_FACTOR",
     "MOVES",
@@ -40,8 +55,10 @@ __all__ = [
     "longer",
     "numbers_in",
     "over",
+    "rounded",
     "run",
     "sizes",
+    "small_of",
     "stacked",
     "tolerated",
     "total",

@@ -1,6 +1,7 @@
 """The time of each member and the state of its step-size controller."""
 
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import Any, NamedTuple, Self
 
 from ..bits import at_most, less, where
@@ -52,7 +53,10 @@ class Pace(NamedTuple):
         error: the last error over the tolerance.
         work: the energy that a control or projection added in accepted steps; for a control the sum over their evaluations.
         longest: the largest size so far of each group, along the first axis.
+        noise: what the rounding of the rates of each group makes in a unit of time, as far as it is known.
+        failed: of each group the error of steps that failed by it over the power 3/2 of their length, the largest; or zero.
         own: tolerances of their own: the relative one of each group, then the absolute one of each; empty if there are none.
+        low: what each number of v, then of y, is more than the state has, where the method keeps it; else empty.
     """
 
     t: Any
@@ -76,19 +80,22 @@ class Pace(NamedTuple):
     error: Any
     work: Any
     longest: Any = ()
+    noise: Any = ()
+    failed: Any = ()
     own: Any = ()
+    low: Any = ()
 
     @classmethod
-    def of(cls, numbers: Sequence[Any], groups: int) -> Self:
-        """From its numbers, one after the other."""
-        single = len(cls._fields) - 2
-        longest, own = stacked(numbers[single : single + groups]), stacked(numbers[single + groups :])
-        return cls(*numbers[:single])._replace(longest=longest, own=own)
+    def of(cls, numbers: Sequence[Any], groups: int, low: int = 0) -> Self:
+        """From its numbers, one after the other, with so many of ``low``."""
+        single = len(cls._fields) - 5
+        ends = *range(single, single + 4 * groups, groups), len(numbers) - low, len(numbers)
+        return cls(*numbers[:single], *(stacked(numbers[first:last]) for first, last in pairwise(ends)))
 
     @property
     def numbers(self) -> list[Any]:
         """Its numbers, one after the other."""
-        return [*self[:-2], *self.longest, *self.own]
+        return [*self[:-5], *self.longest, *self.noise, *self.failed, *self.own, *self.low]
 
     def tolerances(self) -> tuple[Any, Any]:
         """The relative and the absolute tolerance, of all groups or of each."""

@@ -13,7 +13,7 @@ from ..acceptance import Acceptance
 from ..bits import at_most, less, where
 from .attempts import Attempted, Pair, Tried, tried
 from .controller import MAX_FACTOR, MIN_FACTOR, MOVES, Outlook, Pace
-from .sizes import absolute, component, largest, longer, numbers_in, sizes, stacked, total
+from .sizes import component, largest, longer, numbers_in, sizes, stacked, total
 
 #: A new step is the old one times SAFETY·r^(−5/32)·p^(1/16), r being the error over the tolerance and p that of the step before
 #: (PI control, Gustafsson 1988), limited to MIN_FACTOR and MAX_FACTOR; after a rejected step there is no p and no growth. Where
@@ -23,6 +23,23 @@ SAFETY = 0.9
 LOW = 5
 #: r below TINY counts as TINY; p's root, the sixteenth or the thirty-second, is that of 1e-4 or more.
 TINY, CALM_ROOTS = 1e-10, (0.5623413251903491, 0.7498942093324558)
+#: A size counts as no less than this part of the largest that the group has been: 2⁻⁵¹², half of the range of numbers. What
+#: decays to nothing is followed until then.
+LEAST_PART = 1.0 / (1 << 512)
+#: Rates that are differences of larger numbers are wrong by the rounding of these, of which the controller knows nothing, and no
+#: step makes the error small beside a size that has become less than that. So the error of a group is rounding
+#:
+#: - where a shorter step fails, too, with an error that did not fall by the power 3/2 of the length (that of smooth rates falls
+#:   by 3 and more), while the group changes by less than SLOW times the fourth root of the tolerance, so that it is no motion; or
+#:   by PUSHES times its size and more, for a force that sets in where next to nothing is left looks alike. Where it is no such
+#:   push it is at most ROUNDINGS times what is lost in the largest size so far: beside a pole errors do not fall either
+#:   (with algebraic equations it may be any, see ``small_of``);
+#: - where a group stands, its error being UNLIKE times its change, though that is HOLDS_DOWN of what is tolerated or more;
+#: - where it is no more than ALIKE times what is known of it.
+#:
+#: From then on ROUNDED times such an error in the same time is tolerated, up to the tolerance of the largest size so far. That
+#: fades by FADES a step.
+SLOW, PUSHES, UNLIKE, HOLDS_DOWN, ALIKE, ROUNDED, FADES, ROUNDINGS = 0.75, 1024.0, 8.0, 0.125, 4.0, 4.0, 15.0 / 16.0, 64.0
 #: A change of y in a step that is smaller than this, relative to the largest size of y so far, is lost in rounding, with some
 #: margin. So an error of v that moves y by less is tolerated, however small v is: near rest, where forces cancel, v is only
 #: rounding.
@@ -139,7 +156,16 @@ def attempt(
     """
     outlook = pace.outlook(budget)
     trial = tried(pair, system, pace.t, outlook.step, v, y, block_axes)
-    return judged(pace, outlook, order, block_axes, acceptance, v, y, trial)
+    small = small_of(getattr(system.s, "mass_matrix", None))
+    return judged(pace, outlook, order, block_axes, acceptance, v, y, trial, small=small)
+
+
+def small_of(mass_matrix: Any, rounding: float = ROUNDING) -> float:
+    """The most of the largest size so far that an error that does not fall may be to be rounding.
+
+    With algebraic equations it may be all of it: what they are off by after a step is an error of the next one, however short.
+    """
+    return ROUNDINGS * rounding if mass_matrix is None else 1.0
 
 
 def judged(
@@ -152,19 +178,25 @@ def judged(
     y: Array,
     trial: Tried,
     *,
+    small: float,
     rounding: float = ROUNDING,
 ) -> tuple[Pace, Array, Array]:
-    """The pace after an attempt, and the state: the new one if the error is tolerated, and if there was a step to try."""
+    """The pace after an attempt, and the state: the new one if the error is tolerated, and if there was a step to try.
+
+    ``small`` is that of ``small_of``.
+    """
     step, groups, v1, y1 = outlook.step, acceptance.groups, trial.v, trial.y
     old, new = sizes(v, y, block_axes, groups), sizes(v1, y1, block_axes, groups)
     least, bound = tolerated(pace, step, acceptance.counts(*numbers_in(v, y, block_axes)), old, new, rounding)
     error = sizes(*trial.errors[0], block_axes, groups)
-    r = over(error, bound)
+    rounding_error = rounded(pace, step)
+    is_rounding = less(0.0, rounding_error) & at_most(error, rounding_error)
+    r = over(where(is_rounding, 0.0, error), bound)
     # Of a coarse estimate e₃ of third order and one of fifth, the corrected one is e₅²/√(e₅² + 0.01·e₃²). Where rates jump, e₅
     # may be next to nothing by chance, so it is corrected only where the two are as of smooth rates: e₅ falls as e₃^(3/2).
     for coarse in trial.errors[1:]:
-        second = sizes(*coarse, block_axes, groups)
-        of_second, share = over(second, bound), over(second, longer(pace.longest, new))
+        second = where(is_rounding, 0.0, sizes(*coarse, block_axes, groups))
+        of_second, share = over(second, bound), over(second, longer(old, new))
         other = of_second / r
         by_chance = less(CHANCE, other) & less(WILD, share)
         if order > LOW:
@@ -175,8 +207,10 @@ def judged(
     r = where(less(total(new) + total(error), np.inf), r, np.inf)
     for row in acceptance.positive:
         r = where(less(component(v1, y1, block_axes, row), 0.0), longer(r, OUTSIDE), r)
-    rests = at_most(total(error) + total(absolute(new - old)), 0.0)
+    moved = sizes(v1 - v, y1 - y, block_axes, groups)
+    rests = at_most(total(error) + total(moved), 0.0)
     following, goes_on = decided(pace, order > LOW, r, rests, least, outlook)
+    following = heard(pace, following, step, (error, bound), (old, moved), small)
     if trial.work is not None:
         following = following._replace(work=where(goes_on & ~outlook.is_extra, pace.work + trial.work, pace.work))
     return following, *(where(goes_on, new, now) for new, now in zip(trial.projected, (v, y), strict=True))
@@ -202,22 +236,52 @@ def tolerated(pace: Pace, step: Any, counts: tuple[int, int], old: Any, new: Any
     for block in (slice(0, of_v), slice(of_v, sum(counts))):
         longest, after = pace.longest[block], new[block]
         if len(after) == 1:
-            lasting.append(where(rested, after[0] * since, longest[0]))
+            lasting.append(where(rested, after[0] * since, LEAST_PART * longest[0]))
             least.append(after[0])
         elif len(after):
             onset = ONSET * longer(largest(longest), largest(after))
             for size, now in zip(longest, after, strict=True):
                 been = less(0.0, size)
-                lasting.append(where(been, size, where(rested, now * since, onset)))
-                least.append(where(been | rested, now, longer(now, onset)))
+                lasting.append(where(been, LEAST_PART * size, where(rested, now * since, onset)))
+                least.append(where(been | rested | less(onset, now), now, 0.0))
     if all(counts):
         lost = rounding / step
         lasting[:of_v] = [
             longer(size, of_y * lost) for size, of_y in zip(lasting[:of_v], paired(pace.longest[of_v:], of_v), strict=True)
         ]
-    size = longer(where(less(0.0, pace.lasts), stacked(lasting), old), new)
+    size = longer(longer(where(less(0.0, pace.lasts), stacked(lasting), 0.0), old), new)
     relative, absolute = pace.tolerances()
     return stacked(least), absolute + relative * size
+
+
+def rounded(pace: Pace, step: Any) -> Any:
+    """Of each group the error that is rounding."""
+    noise, most = pace.noise * step, pace.tolerances()[0] * pace.longest
+    return longer(where(less(most, noise), most, noise), 0.0)
+
+
+def heard(pace: Pace, following: Pace, step: Any, errors: tuple[Any, Any], sizes: tuple[Any, Any], small: float) -> Pace:
+    """The pace after an attempt, with what is known of rounding. ``errors`` are those of groups, and what is tolerated of them.
+
+    ``sizes`` are those before the step, and of the change in it; ``small`` is that of ``small_of``.
+    """
+    (error, bound), (old, moved) = errors, sizes
+    takes, fails = less(pace.accepted, following.accepted), less(pace.rejected, following.rejected)
+    per_power, per_time, alike = 1.0 / (step * np.sqrt(step)), ROUNDED / step, ALIKE * step
+    relative, _ = pace.tolerances()
+    most = relative * pace.longest
+    offends = less(bound, error) & at_most(error, most) & less(0.0, pace.lasts)
+    share, is_small = error * per_power, at_most(error, small * pace.longest)
+    is_slow, is_pushed = at_most(moved, SLOW * np.sqrt(np.sqrt(relative)) * old), less(PUSHES * old, moved)
+    falls_slowly = less(0.0, pace.failed) & at_most(pace.failed, share) & ((is_slow & is_small) | is_pushed)
+    is_rounding = falls_slowly | (at_most(error, alike * pace.noise) & is_small)
+    failed = where(at_most(moved, UNLIKE * error), pace.failed, 0.0)
+    noise = where(is_rounding, error * per_time, FADES * pace.noise)
+    stands = at_most(UNLIKE * moved, error) & less(HOLDS_DOWN * bound, error) & less(0.0, pace.lasts)
+    taken = where(stands, error * per_time, FADES * pace.noise)
+    offends = fails & offends
+    noise = where(offends, noise, where(takes, taken, pace.noise))
+    return following._replace(noise=noise, failed=where(offends, longer(share, pace.failed), where(takes, failed, pace.failed)))
 
 
 def decided(pace: Pace, high: bool, r: Any, rests: Any, new: Any, outlook: Outlook) -> tuple[Pace, Any]:

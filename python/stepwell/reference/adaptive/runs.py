@@ -22,7 +22,7 @@ def waiting(
     ``tolerance`` is ``relative``, ``absolute`` and ``lasts`` of a ``Pace``, ``samples`` its ``interval`` and ``until``.
     """
     counts = *tolerance, t0, *samples, most_step, np.inf, 1.0, MAX_FACTOR
-    return Pace(t0, first, t0, 0.0, 0.0, *counts, 0.0, 0.0, 0.0, 0.0, 0.0, np.zeros(groups))
+    return Pace(t0, first, t0, 0.0, 0.0, *counts, 0.0, 0.0, 0.0, 0.0, 0.0, *np.zeros((3, groups)))
 
 
 class Jumps(NamedTuple):

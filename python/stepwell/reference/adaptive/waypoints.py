@@ -14,11 +14,6 @@ FIRST = 256
 ON_THE_WAY = -1.0
 
 
-def is_near(count: int) -> bool:
-    """Whether a member that has accepted so many steps stands at a waypoint, or a step before one."""
-    return any(each >= FIRST and each & (each - 1) == 0 for each in (count, count + 1))
-
-
 def keep(rows: Array, accepted: Any, pace: Pace, v: Array, y: Array) -> None:
     """Keep where members stand that came by this attempt to a waypoint, or to a step before one.
 

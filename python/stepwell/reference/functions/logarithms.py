@@ -24,6 +24,7 @@ from ..bits import (
 )
 from .elementary import elementary
 from .exponential import CONSTANTS as EXPONENTIAL
+from .exponential import exp
 from .pieces import INFINITY, NAN, fast_sum, halves, polynomial, power_of_two
 
 
@@ -136,6 +137,14 @@ def log1p(x: Any) -> Any:
     ln2 = EXPONENTIAL.of(x).ln2
     value = p.k * ln2[0] - ((p.half - (p.rest + (p.k * ln2[1] + lost))) - p.f)
     return at_the_ends(u, either_bits(value, sign_of(x)))
+
+
+@elementary
+def logaddexp(x: Any, y: Any) -> Any:
+    """ln(eˣ + eʸ), without overflow in between; where it is near zero it has the error of a sum of numbers of the size of x."""
+    less = x < y
+    a, b = where(less, y, x), where(less, x, y)
+    return where(equal(a, b), a + 0.6931471805599453, a + log1p(exp(b - a)))
 
 
 def _in_base(x: Any, factor: tuple[float, float], unit: tuple[float, float]) -> Any:

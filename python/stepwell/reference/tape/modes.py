@@ -4,7 +4,8 @@ Derivatives are exact up to rounding: no difference quotients are used. Derivati
 tape merges equal operations. The same functions give derivatives of derivatives.
 
 The derivative of a choice is that of the chosen value, even if that of the other one is not finite: forwards by the same choice,
-backwards by choosing zero (``_Guard``) for the value that was not chosen.
+backwards by choosing zero (``_Guard``) for the value that was not chosen. Likewise, where an exponential may overflow, a change
+that is infinite makes nothing of a quotient or a function whose factor is zero: 1/(1 + exp x) is constant far from its middle.
 """
 
 from __future__ import annotations
@@ -123,9 +124,32 @@ def _factors(listing: Listing, line: int, wanted: list[bool]) -> tuple[Any, ...]
     return factors(listing.operations[line].name, list(reads), listing.symbols[line])
 
 
+#: Functions that overflow, and the operands of others that saturate: which of them, of all operations that are no functions.
+_OVERFLOWING, _SATURATING = {"exp", "exp2", "expm1", "sinh", "cosh", "power"}, {"divide": (1,), "multiply": (0, 1)}
+
+
+def _saturating(listing: Listing) -> list[Sequence[int]]:
+    """The operands of each line with a change that counts only where its factor is not zero."""
+    if not any(mark.name in _OVERFLOWING for mark in listing.marks.values()):
+        return [()] * len(listing.operations)
+    return [
+        range(len(listing.marks[line].arguments)) if line in listing.marks else _SATURATING.get(operation.name, ())
+        for line, operation in enumerate(listing.operations)
+    ]
+
+
+def _makes_nothing(factor: Any, change: Any) -> Any:
+    """Whether one is zero and the other infinite; None if never. Elsewhere a product with zero has derivatives of its own."""
+    if not (isinstance(factor, Symbol) and isinstance(change, Symbol)):
+        return None
+    product = _times(factor, change)
+    return ~product.equals(product) & factor.equals(factor) & change.equals(change)
+
+
 def _forward(listing: Listing, seeds: dict[int, dict[int, Symbol]]) -> list[dict[int, Symbol]]:
     """Of each line, its derivative in each direction in which it changes; ``seeds`` has those of some symbols by their number."""
     rows: list[dict[int, Symbol]] = []
+    saturating = _saturating(listing)
     by_number: dict[int, dict[int, Symbol]] = {}
     for line, symbol in enumerate(listing.symbols):
         if (row := seeds.get(symbol.id)) is None:
@@ -140,10 +164,12 @@ def _forward(listing: Listing, seeds: dict[int, dict[int, Symbol]]) -> list[dict
                     row[k] = truth.choose(changes[1].get(k, 0.0), changes[2].get(k, 0.0))
             else:
                 factors = _factors(listing, line, list(map(bool, changes)))
-                for factor, change in zip(factors, changes, strict=True):
+                for i, (factor, change) in enumerate(zip(factors, changes, strict=True)):
                     if factor is not None:
                         for k, each in change.items():
                             term = _times(factor, each)
+                            if i in saturating[line] and (nothing := _makes_nothing(factor, each)) is not None:
+                                term = nothing.choose(0.0, term)
                             row[k] = row[k] + term if k in row else term
         rows.append(row)
         by_number[symbol.id] = row
@@ -172,7 +198,7 @@ class _Guard:
 def _backward(listing: Listing, root: int, numbers: list[int]) -> list[Symbol]:
     """The derivatives of one line with respect to the symbols of these numbers."""
     tape = listing.tape
-    changing = _changing(listing, numbers)
+    changing, saturating = _changing(listing, numbers), _saturating(listing)
     adjoints: dict[int, tuple[Any, _Guard]] = {root: (tape.number(1.0), _Guard())}
 
     def pass_on(to: Any, share: Any, guard: _Guard) -> None:
@@ -193,9 +219,11 @@ def _backward(listing: Listing, root: int, numbers: list[int]) -> list[Symbol]:
             if wanted[2]:
                 pass_on(no, truth.choose(0.0, share), guard.also(~truth))
             continue
-        for factor, each, want in zip(_factors(listing, line, wanted), reads, wanted, strict=True):
-            if want and factor is not None:
-                pass_on(each, guard.where_needed(_times(factor, share)), guard)
+        for i, (factor, each) in enumerate(zip(_factors(listing, line, wanted), reads, strict=True)):
+            if wanted[i] and factor is not None:
+                nothing = _makes_nothing(factor, share) if i in saturating[line] else None
+                needed = guard if nothing is None else guard.also(~nothing)
+                pass_on(each, needed.where_needed(_times(factor, share)), needed)
     places = [listing.place.get(each) for each in numbers]
     return [_or_zero(tape, adjoints[line][0] if line is not None and line in adjoints else None) for line in places]
 

@@ -117,6 +117,7 @@ PARTIALS: dict[str, tuple[Partial | None, ...]] = {
     "cbrt": (lambda f, y, x: (1.0 / 3.0) / (y * y),),
     "square": (lambda f, y, x: 2.0 * x,),
     "hypot": (lambda f, y, a, b: a / y, lambda f, y, a, b: b / y),
+    "logaddexp": (lambda f, y, a, b: f("exp")(a - y), lambda f, y, a, b: f("exp")(b - y)),
     "power": (_by_base, _by_exponent),
     "abs": (lambda f, y, x: _sign(x),),
     "copysign": (lambda f, y, a, b: _sign(y) * _sign(a), None),

@@ -24,6 +24,7 @@ from .adaptive import (
     MOST_STEP,
     PACE_NUMBERS,
     RELATIVE,
+    SCALES,
     STEP,
     TARGET,
     TIME,
@@ -46,12 +47,13 @@ from .adaptive import (
     evaluations_of_attempt,
     groups_of,
     jumps_of,
+    low_numbers,
     numbers_of,
+    own_tolerances,
     pace_numbers,
     pace_of,
     paces,
     pacing_of_core,
-    room_for_waypoints,
 )
 from .direct import to_slot
 from .forms import advance, model
@@ -71,6 +73,7 @@ __all__ = [
     "MOST_STEP",
     "PACE_NUMBERS",
     "RELATIVE",
+    "SCALES",
     "STEP",
     "TARGET",
     "TIME",
@@ -98,14 +101,15 @@ __all__ = [
     "evaluations_of_attempt",
     "groups_of",
     "jumps_of",
+    "low_numbers",
     "model",
     "numbers_of",
+    "own_tolerances",
     "pace_numbers",
     "pace_of",
     "paces",
     "pacing_of_core",
     "pushes",
-    "room_for_waypoints",
     "to_slot",
 ]
 

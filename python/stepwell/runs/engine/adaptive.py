@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from math import prod
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -20,8 +20,10 @@ from .plan import Plan, model
 if TYPE_CHECKING:
     from ...reference.adaptive import Attempted, Jumps, Pace
 
-#: The numbers of a ``Pace`` that are not of a group of components; those of groups follow.
-PACE_NUMBERS = 20
+#: The numbers of a ``Pace`` that are not of a group of components; those of groups follow: ``SCALES`` of each, the
+#: largest sizes first, and two tolerances if groups have their own. Last are those that a series keeps of each number of the
+#: state.
+PACE_NUMBERS, SCALES = 20, 3
 #: Places among them; the counts are of accepted, rejected and extra steps.
 TIME, STEP, TARGET, EXTRA, HELD, RELATIVE, ABSOLUTE, LASTS, ERROR = 0, 1, 2, 3, 4, 5, 6, 7, 18
 INTERVAL, UNTIL, MOST_STEP, COUNTS, WORK = 9, 10, 11, slice(15, 18), 19
@@ -32,6 +34,11 @@ SHORT = 32.0 * BLIND
 #: The least absolute tolerance, 1024 times the smallest number above zero. A state that grows from zero under a smooth push
 #: begins with numbers of few bits, whose relative error cannot be small.
 LEAST = 2.0**-1064
+#: Errors of steps add up, and the number of steps of second order grows as the third root of the tolerance falls: the error of a
+#: run goes by the power 2/3 of it. So below this one the tolerance of such a step is multiplied by the root of its share of this,
+#: but by no less than the second number, which makes three times as many steps, and not to less than the third: else they would
+#: soon be a million.
+SECOND_ORDER, LEAST_SHARE, LEAST_OF_A_STEP = 1e-3, 2.0**-5, 1e-13
 #: How many waypoints are kept of a member, and the most numbers of them; of larger batches there are none.
 WAYPOINTS = 2
 MOST_IN_WAYPOINTS = 1 << 21
@@ -49,13 +56,28 @@ class Tolerances(NamedTuple):
     absolute: Array | None
     of_groups: bool = False
 
+    def of_steps(self, method: Method) -> Tolerances:
+        """Those of its steps, in proportion to which the errors of runs are: SECOND_ORDER and less for a method of that order."""
+        if method.order != 2:
+            return self
+        share = np.sqrt(np.clip(self.relative / SECOND_ORDER, LEAST_SHARE**2, 1.0))
+        relative = np.maximum(share * self.relative, np.minimum(self.relative, LEAST_OF_A_STEP))
+        if self.absolute is None:
+            return self._replace(relative=relative)
+        absolute: Any = self.absolute
+        if self.of_groups:  # whose axis comes before those of members
+            axes = max(share.ndim, absolute.ndim)
+            share, absolute = (each.reshape(*each.shape, *[1] * (axes - each.ndim)) for each in (share, absolute))
+        return self._replace(relative=relative, absolute=share * absolute)
+
 
 class Pacing(NamedTuple):
     """When the state is saved, ascending, the most attempts of a member, and whether members have yet to begin.
 
     ``at`` and ``jumps``, the times that no step crosses, are the same for all members or one for each, shape (times, *batch).
     Every ``every``-th accepted step of a member is saved, 0 for none. The core has ``room`` for this many steps of each member,
-    and a member that has filled it ends with the status ``FULL``. ``waypoints`` asks for where members stood on the way.
+    and a member that has filled it ends with the status ``FULL``. ``waypoints`` asks for where members stood on the way; or it is
+    those that a run that goes on has.
     """
 
     at: Array
@@ -64,7 +86,7 @@ class Pacing(NamedTuple):
     jumps: Array | None = None
     every: int = 0
     room: int = 0
-    waypoints: bool = False
+    waypoints: bool | Array = False
 
 
 class CorePacing(NamedTuple):
@@ -173,6 +195,8 @@ class Adapted(NamedTuple):
 
 def room_for_waypoints(pacing: Pacing, state: int, pace: int, members: int) -> Array | None:
     """Room for the waypoints of all members, two states and a pace each; None if they are not asked for, or are too many."""
+    if isinstance(pacing.waypoints, np.ndarray):
+        return pacing.waypoints
     numbers = 2 * state + pace
     if not pacing.waypoints or WAYPOINTS * numbers * members > MOST_IN_WAYPOINTS:
         return None
@@ -188,7 +212,20 @@ def groups_of(plan: Plan) -> int:
 
 def pace_numbers(plan: Plan) -> int:
     """The number of numbers of a member's ``Pace``."""
-    return PACE_NUMBERS + groups_of(plan) * (3 if plan.acceptance.own else 1)
+    return PACE_NUMBERS + plan.acceptance.numbers(prod(plan.system.v_shape), prod(plan.system.y_shape))
+
+
+def low_numbers(plan: Plan) -> int:
+    """How many numbers of the state a member's ``Pace`` keeps more digits of: all by a series, else none."""
+    return plan.acceptance.compensated * (prod(plan.system.v_shape) + prod(plan.system.y_shape))
+
+
+def own_tolerances(paces: Any, groups: int, low: int) -> Any:
+    """The tolerances of groups of their own, the relative ones and then the absolute ones; no rows if they have none.
+
+    ``low`` is how many numbers stand behind them.
+    """
+    return paces[PACE_NUMBERS + SCALES * groups : len(paces) - low]
 
 
 def paces(
@@ -219,7 +256,8 @@ def paces(
     each = [-BLIND if step is None else step, relative, absolute, np.inf if most_step is None else most_step, t0]
     h, *both, longest, begin = (_one_number(number) for number in each)
     tolerance = both[0], both[1], float(tolerances.absolute is None)
-    numbers = [*adaptive.waiting(begin, h, tolerance, plan.system.samples, longest, groups).numbers, *own]
+    waiting = adaptive.waiting(begin, h, tolerance, plan.system.samples, longest, groups)
+    numbers = [*waiting.numbers, *own, *low_numbers(plan) * [0.0]]
     if not any(getattr(number, "ndim", 0) for number in numbers):  # as ``np.ndim``, in a fifth of the time
         return np.array(numbers, dtype=np.float64)
     out = np.empty((len(numbers), *plan.batch))
@@ -251,7 +289,7 @@ def begun_again(plan: Plan, numbers: Array, t: Array, v: Array, y: Array) -> Arr
 
     pace, zero = pace_of(plan, numbers), np.zeros(plan.batch)
     anew = pace._replace(t=t, h=zero - BLIND, target=t, extra=zero, held=zero, begin=t, wall=zero + np.inf)
-    anew = anew._replace(before=zero + 1.0, most=zero + adaptive.MAX_FACTOR)
+    anew = anew._replace(before=zero + 1.0, most=zero + adaptive.MAX_FACTOR, low=0.0 * np.asarray(pace.low))
     return numbers_of(begun(plan, numbers_of(anew), v, y))
 
 
@@ -269,7 +307,7 @@ def pace_of(plan: Plan, numbers: Array) -> Pace:
 
     batch = plan.batch
     rows = numbers if numbers.shape[1:] == batch else [np.broadcast_to(row, batch) for row in numbers]
-    return adaptive.Pace.of(list(rows), groups_of(plan))
+    return adaptive.Pace.of(list(rows), groups_of(plan), low_numbers(plan))
 
 
 def numbers_of(pace: Pace) -> Array:
@@ -324,8 +362,9 @@ def attempt_by_numpy(plan: Plan, budget: int) -> Any:
     return attempts(plan, attempted_system(plan))
 
 
-def adapt(plan: Plan, pacing: Pacing, paces: Array, v: Array, y: Array) -> Adapted:
-    """Step every member to its last time; ``paces`` has a column for each member, or one for all."""
+def adapt(plan: Plan, pacing: Pacing, paces: Array, v: Array, y: Array, *, make: Callable[..., bool] | None = None) -> Adapted:
+    """Step every member to its last time; ``paces`` has a column for each member, or one for all. ``make`` makes the steps."""
+    make = _adapt_by_core if make is None else make
     if plan.backend == "numpy":
         return _adapt_by_numpy(plan, pacing, paces, v, y)
     times, n_v, members, numbers = len(pacing.at), prod(plan.system.v_shape), plan.members, pace_numbers(plan)
@@ -344,9 +383,9 @@ def adapt(plan: Plan, pacing: Pacing, paces: Array, v: Array, y: Array) -> Adapt
     arrays = AdaptiveArrays(rows_v, rows_y, before, saved_v, saved_y, last, last_paces, ends, None, steps, waypoints)
     core_pacing, core_plan = pacing_of_core(plan, pacing), plan._replace(t0=0.0)
     spec = model(core_plan)
-    if not _adapt_by_core(spec, core_plan, core_pacing, arrays):  # an attempt is not one tape: the reference finds the start
+    if not make(spec, core_plan, core_pacing, arrays):  # an attempt is not one tape: the reference finds the start
         before = numbers_of(begun(plan, paces, v, y)).reshape(numbers, members)
-        _adapt_by_core(spec, core_plan, core_pacing._replace(begins=False), arrays._replace(paces=before))
+        make(spec, core_plan, core_pacing._replace(begins=False), arrays._replace(paces=before))
     each = evaluations_of_attempt(plan)
     last_v, last_y = last[:n_v].reshape(v.shape), last[n_v:].reshape(y.shape)
     paces = last_paces.reshape(numbers, *plan.batch)

@@ -112,13 +112,14 @@ def tried_attempt(plan: Plan) -> Any:
     from ...reference import adaptive
 
     steps, order = steps_of_single(plan, "tried"), plan.method.error_order
+    small = adaptive.small_of(plan.system.mass_matrix, adaptive.SINGLE_ROUNDING)
     assert order is not None
 
     def attempt(pace: adaptive.Pace, budget: int, v: Array, y: Array) -> tuple[adaptive.Pace, Array, Array]:
         outlook = pace.outlook(budget)
         trial = tried(plan, steps, pace.t, outlook.step, v, y)
         return adaptive.judged(
-            pace, outlook, order, plan.block_axes, plan.acceptance, v, y, trial, rounding=adaptive.SINGLE_ROUNDING
+            pace, outlook, order, plan.block_axes, plan.acceptance, v, y, trial, small=small, rounding=adaptive.SINGLE_ROUNDING
         )
 
     return attempt

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from math import prod
 from typing import Any
 
@@ -67,19 +67,28 @@ def _run_by_reference(plan: Plan, v: Array, y: Array, before: Whole, carried: bo
     slot, *kept = to_blocks(plan, v if carried else to_slot(plan, v, y))
     kept += remembered or []
 
+    memories = [remembered]
+
     def step(t: float, v: Array, y: Array) -> Blocks:
         nonlocal kept
         v, y, *kept = make(t, v, y, kept)
+        if remembered is not None and plan.record:
+            memories.append(kept[len(plan.method.kept) :])
         return v, y
 
     slot, y, saved, first_bad = looped(plan, step, slot, y, before, plan.block_axes, to_velocity(plan))
     out = finished(plan, slot, saved, first_bad)
     if plan.keeps:
         out = out._replace(slot=_joined(plan, [slot, *kept]))
+
+    def recorded_of(name: str, i: int) -> Array:
+        if name in plan.system.quantities:
+            return np.asarray(s.record(name, out.v[i], out.y[i]))
+        return np.asarray(plan.system.controller.held(plan.system, name, memories[plan.saves[i]]))
+
     with np.errstate(all="ignore"):
         recorded = {
-            name: _stacked((s.record(name, *state) for state in zip(out.v, out.y, strict=True)), plan.save_count)
-            for name in plan.record
+            name: _stacked((recorded_of(name, i) for i in range(plan.save_count)), plan.save_count) for name in plan.record
         }
     work = None if plan.system.control is None else np.broadcast_to(np.asarray(s.work), plan.batch).copy()
     return out._replace(recorded=recorded, work=per_step(plan, work))
@@ -194,9 +203,16 @@ def finished(plan: Plan, slot: Array, saved: Blocks, first_bad: Any) -> Outcome:
 
 
 def run_by_core(
-    plan: Plan, model: _core.ModelSpec, v: Array, y: Array, before: Whole, carried: bool, carries: bool | None = None
+    plan: Plan,
+    model: _core.ModelSpec,
+    v: Array,
+    y: Array,
+    before: Whole,
+    carried: bool,
+    carries: bool | None = None,
+    make: Callable[..., bool] = _core.run,
 ) -> Outcome:
-    """The run by the core. ``carries`` is whether it returns a carry, as the plan does if None."""
+    """The run by the core. ``carries`` is whether it returns a carry, as the plan does if None; ``make`` makes the steps."""
     carries = plan.begins if carries is None else carries
     count = plan.save_count
     empty = np.empty if count * (v.size + y.size) < buffer_pool.LEAST_POOLED // 8 else buffer_pool.empty
@@ -205,14 +221,13 @@ def run_by_core(
     carry = np.empty(plan.slot_shape if plan.keeps else v.shape, plan.dtype) if carries else None
     recorded = None
     if plan.record:
-        shapes = {name: plan.system.quantities[name] for name in plan.record}
-        recorded = buffer_pool.empty((count, sum(map(prod, shapes.values())), *plan.batch))
+        known = plan.system.recorded_shapes()
+        shapes = {name: known[name] for name in plan.record}
+        recorded = buffer_pool.empty((count, sum(map(prod, shapes.values())), *plan.batch), plan.dtype)
     work = None if plan.system.control is None else np.empty(plan.batch, plan.dtype)
-    tally, noticed = None if work is None else work.reshape(-1), None
     if plan.watched is not None:
-        before_it = 0 if work is None else 1
-        sums = np.full((before_it + plan.watched.number + 1, *plan.batch), np.nan)
-        tally, noticed, work = sums.reshape(-1), sums[before_it:], None
+        work = None  # what is watched stands behind it
+    tally = None if work is None else work.reshape(-1)
     rows_v, rows_y = rows(v, plan.batch), rows(y, plan.batch)
     if plan.memory is not None:
         members = plan.members if rows_v.shape[1] != 1 or plan.batch else 1
@@ -222,7 +237,7 @@ def run_by_core(
         rows_v = np.ascontiguousarray(np.concatenate([of_v, memory]))
     arrays = Arrays(rows_v, rows_y, carried, saved_v, saved_y, recorded, tally, carry, before.reshape(-1))
     if plan.device is None:
-        diverged = _core.run(model, plan.of_core(), arrays)
+        diverged = make(model, plan.of_core(), arrays)
     else:
         from ...device import fixed  # only such runs need it
 
@@ -231,6 +246,6 @@ def run_by_core(
     if recorded is not None:
         for name, shape in shapes.items():
             mine, recorded = recorded[:, : prod(shape)], recorded[:, prod(shape) :]
-            by_name[name] = mine.reshape(count, *shape, *plan.batch)
+            by_name[name] = np.asarray(mine.reshape(count, *shape, *plan.batch), np.float64)
     work = None if work is None else per_step(plan, work)
-    return Outcome(saved_v, saved_y, saved_v[-1] if carry is None else carry, before, by_name, work, diverged, noticed)
+    return Outcome(saved_v, saved_y, saved_v[-1] if carry is None else carry, before, by_name, work, diverged)

@@ -198,8 +198,7 @@ class Arrays(NamedTuple):
 class Outcome(NamedTuple):
     """Saved states, last slots, each member's first step that was not finite, recorded quantities, and the sum of a control.
 
-    ``diverged`` is False if it is known that no member has such a step. ``noticed`` has for each watched quantity its value at
-    the start of the last step, and last how many changes of sign there were up to there; NaN where the core did not count.
+    ``diverged`` is False if it is known that no member has such a step.
     """
 
     v: Array
@@ -209,7 +208,6 @@ class Outcome(NamedTuple):
     recorded: dict[str, Array] | None = None
     work: Array | None = None
     diverged: bool = True
-    noticed: Array | None = None
 
 
 def model(plan: Plan) -> _core.ModelSpec:
@@ -231,7 +229,9 @@ def model(plan: Plan) -> _core.ModelSpec:
         parameters.append(("watched()", plan.watched.quantities))
     options: Any = {}
     if plan.record or plan.fuses:
-        options = {"record": list(plan.record), "fused": plan.fuses}
+        targets = [] if plan.system.controller is None else plan.system.controller.targets(plan.system)
+        held = {each.name: each.row for each in targets if each.name not in plan.system.quantities}
+        options = {"record": [held.get(name, name) for name in plan.record], "fused": plan.fuses}
     if plan.order or plan.backward or plan.acceptance != Acceptance():
         options |= {"order": plan.order, "acceptance": tuple(plan.acceptance), "backward": plan.backward}
     if plan.single:

@@ -18,11 +18,13 @@ from ...base.arrays import Array, Whole
 from ...reference.adaptive import sizes
 from .. import engine
 from ..result import Status
+from . import by_core
 from .attempts import Attempts, attempted
 from .collected import AT_START, Collected, Stops
 from .event import Event, names_of_changing
-from .parts import Changes
-from .resets import LARGEST_RATIO, NO_TIME, SETTLED, Resets
+from .parts import Changes, Located
+from .resets import LARGEST_RATIO, MOST_IN_A_STEP, NO_TIME, SETTLED, Resets
+from .traced import Quantity
 from .trials import AdaptiveTrials
 
 #: As ``engine.adapt``, for members of a whole run and with the times at which they stop.
@@ -37,8 +39,13 @@ LEAST_ATTEMPTS = 16
 #: Times between changes of the state that shrink geometrically have a limit. A member is set to it when no more than this share
 #: of its time is left until then; and also, however they shrink, when the last one is less than NO_FLIGHT of its time.
 LEFT_OF_SERIES, NO_FLIGHT = 2.0**-20, 2.0**-44
+#: A member whose state was changed within this share of its time so far as often as it may be within a step of fixed length is
+#: at rest, by whatever events: these follow each other within no time, or are too many to be followed.
+RECENT = 2.0**-10
 #: Before the first step this share of the run is taken as the length of a step.
 SHARE_OF_RUN = 2.0**-10
+#: Where an event holds a member, this many times of the rest of the run are looked at for whether it lets it go.
+LOOKS = 1 << 10
 
 
 class AdaptiveRun:
@@ -59,7 +66,12 @@ class AdaptiveRun:
         changing = any(event.then for event in self._events)
         self._driver = driver = (_Resetting if changing else _Driver)(plan, self._events, pacing)
         driver.keep = self._keep
-        out = driver.run(paces, v, y)
+        # A series is not looked at in the lanes, where its coefficients are.
+        if changing or self._keep is not None or plan.method.has_series or (looked := by_core.sought(driver)) is None:
+            out = driver.run(paces, v, y)
+        else:
+            out = engine.adapt(plan, pacing, paces, v, y, make=partial(by_core.adapted, driver, looked))
+            out = driver.looked_again(out, paces, v, y)
         if plan.progress is not None:
             plan.progress(1.0)
         return out
@@ -98,6 +110,29 @@ class _Driver(Collected):
 
     def run(self, paces: Array, v: Array, y: Array) -> engine.Adapted:
         """Find all events, then make the run up to where members stop."""
+        everyone = np.arange(self.plan.members)
+        self._search(everyone, paces, v, y)
+        return self.stepped(self.plan, self.pacing, everyone, paces, v, y)
+
+    def looked_again(self, out: engine.Adapted, paces: Array, v: Array, y: Array) -> engine.Adapted:
+        """A run by the core, with the events of the steps that it would have without saved times.
+
+        An extra step to a saved time whose error is not tolerated makes the next steps shorter: of such members they are found here.
+        """
+        if not (others := np.flatnonzero(self.other_steps)).size:
+            return out
+        if any(event.terminal for event in self.events):
+            self.clear()
+            self.stopped_at[:] = np.nan
+            return self.run(paces, v, y)
+        for entries in self.entries:
+            entries[:] = [each.some(~self.other_steps[each.member]) for each in entries]
+        self.count[:, others] = 0
+        self._search(others, paces, v, y)
+        return out
+
+    def _search(self, index: Whole, paces: Array, v: Array, y: Array) -> None:
+        """Find the events of some members, from the start of the run."""
         system, total = self.plan.system, self.plan.members
         rows = np.broadcast_to(paces.reshape(self.numbers, -1), (self.numbers, total))
         blocks = v.reshape(*system.v_shape, total), y.reshape(*system.y_shape, total)
@@ -105,8 +140,8 @@ class _Driver(Collected):
             # A held step was searched before, up to the last time of the run that goes on.
             self.since = np.where(rows[engine.HELD] > 0.0, rows[engine.TARGET], -np.inf)
             self.begin = rows[engine.TIME]
-        self.look(np.arange(total), rows, *blocks, self.pacing.begins)
-        return self.stepped(self.plan, self.pacing, np.arange(total), paces, v, y)
+        self.cover(self.begin, self.end)
+        self.look(index, rows[:, index], *(block[..., index] for block in blocks), self.pacing.begins)
 
     def look(self, index: Whole, paces: Array, v: Array, y: Array, begins: bool) -> None:
         """Find the events of some members, from where they stand."""
@@ -147,7 +182,9 @@ class _Driver(Collected):
         v, y = states = tuple(np.moveaxis(each, 0, axes) for each, axes in zip((out.v, out.y), now.block_axes, strict=True))
         parameters, h = self.members.numbers(index), out.lengths(now)
         g = [self.quantity(e, out.t, v, y, parameters) for e in range(len(self.events))]
-        may, moves = [self.may_change(e, index, each) for e, each in enumerate(g)], out.t[1:] > out.t[:-1]
+        may, moves = [self.may_change(e, index, out.t, each) for e, each in enumerate(g)], out.t[1:] > out.t[:-1]
+        for e in (e for e, each in enumerate(self.quantities) if isinstance(each, Quantity)):
+            may[e] |= self.may_bend(e, index, out.t, h, v, y, g[e])
         self.looks(index, out, may)
         if not np.any([each.any() for each in may]):
             return np.zeros(len(index), dtype=bool)
@@ -157,7 +194,8 @@ class _Driver(Collected):
             begins, ends = ([each[..., row + later, place] for each in states] for later in (0, 1))
             step, places = taken[row, place].astype(np.int64), (row, place)
             low, high, values = np.zeros(len(row)), np.ones(len(row)), (g[e][places], g[e][row + 1, place])
-            return Changes(row, place, index[place], step, out.t[places], h[places], low, high, *values, *begins, *ends)
+            time = out.t[places], h[places], out.t[row + 1, place]
+            return Changes(row, place, index[place], step, *time, low, high, *values, *begins, *ends)
 
         changes = [self.parts(e, known(e, *np.nonzero(each & moves))) for e, each in enumerate(may)]
         # Steps that go beyond the end, or began before this run, are in it only in part.
@@ -174,9 +212,9 @@ class _Driver(Collected):
         if stops is None:
             return np.zeros(len(index), dtype=bool)
         which, whose = stops.which, index[stops.which]
-        for all_stops, state in zip(self.stop_state, (stops.v, stops.y), strict=True):
+        for all_stops, state in zip(self.stop_state, (stops.at.v, stops.at.y), strict=True):
             all_stops[..., whose] = state[..., which]
-        row = stops.step[which]
+        row = stops.row[which]
         self.attempts[whose] = before.sum(axis=0)[which] + row + 1
         self.steps[whose] = taken[row + 1, np.flatnonzero(which)]
         self.left(whose, np.flatnonzero(which), row, longest, out, stops)
@@ -237,10 +275,12 @@ class _Resetting(_Driver):
         self._start, self._flight, self._ratio = (np.full(total, np.nan) for _ in range(3))
         self._state = tuple(np.full_like(each, np.nan) for each in self.stop_state)
         self._longest = np.zeros((engine.groups_of(plan), total))
-        #: The side from which members came to each event that ended their part, 0 for others, and the largest |g| around it.
+        #: Of members whose part ended in these steps: what occurs there, as of ``Stops``, and the lengths of their steps.
         self._sides, self._sizes = (np.zeros((len(events), total)) for _ in range(2))
-        #: The lengths of the steps that ended in these events.
-        self._lengths = np.zeros(total)
+        self._due, self._lengths = np.zeros((len(events), total), dtype=bool), np.zeros(total)
+        self._shares, self._steps = np.full(total, np.nan), np.zeros(total, dtype=np.int64)
+        #: When the count of recent changes began, and that count.
+        self._recent, self._changes = np.array(self.begin, dtype=np.float64), np.zeros(total, dtype=np.int64)
         #: The number of the event at which a member is at rest; else −1.
         self._rests = np.full(total, -1)
 
@@ -266,20 +306,22 @@ class _Resetting(_Driver):
 
         while len(index):
             self._go_on_anew(index)
-            rests = self._rests[index] >= 0
-            there = [each[..., index[rests]] for each in self.stop_state]
-            keep(index[rests], there, there)
-            rows[engine.TIME, index[rests]] = self.stopped_at[index[rests]]
-            index = index[~rests]
+            over = ~np.isnan(self.stopped_at[index])
+            there = [each[..., index[over]] for each in self.stop_state]
+            keep(index[over], there, there)
+            rows[engine.TIME, index[over]] = self.stopped_at[index[over]]
+            free, wakes = self._let_go(index)
+            index, later = index[~over | free], index[wakes]
             if not len(index):
-                break
+                index = later
+                continue
             v, y = (each[..., index] for each in self._state)
             plan, pacing, pace = self._begun(index, np.ascontiguousarray(at[:, index]), rows[:, index], v, y)
             self.look(index, pace, v, y, begins=False)
             part = self.stepped(plan, pacing, index, pace, v, y)
             keep(index, (part.v, part.y), (part.last_v, part.last_y))
             rows[:, index], status[index] = part.paces, part.status
-            index = self._going_on(index)
+            index = np.sort(np.concatenate([self._going_on(index), later]))
         return out._replace(
             v=saved[0].reshape(out.v.shape),
             y=saved[1].reshape(out.y.shape),
@@ -290,17 +332,16 @@ class _Resetting(_Driver):
         )
 
     def _going_on(self, index: Whole) -> Whole:
-        """Which of these members go on from another state: those that no terminal event stopped."""
-        ends = self._sides[:, index] != 0.0
-        changes = np.array([self._resets.changes(e) for e in range(len(self.events))])
-        on: Whole = index[ends.any(axis=0) & ~ends[~changes].any(axis=0)]
+        """Which of these members ended a part: at an event that changes the state, or that stops them."""
+        on: Whole = index[self._due[:, index].any(axis=0)]
         return on
 
     def _go_on_anew(self, index: Whole) -> None:
-        """Change the states of these members, which then go on or are at rest."""
-        t, sides, sizes_of = self.stopped_at[index], self._sides[:, index], self._sizes[:, index]
-        v, y = (each[..., index] for each in self.stop_state)
-        v, y, at, event = self._resets.new_states(t, self._lengths[index], v, y, index, sides, sizes_of)
+        """Change the states of these members, which then go on, or are at rest, or stop."""
+        t, v, y = self.stopped_at[index], *(each[..., index] for each in self.stop_state)
+        ended = Located(index, self._steps[index], self._shares[index], t, v, y)
+        known = self._sides[:, index], self._due[:, index], self._sizes[:, index]
+        v, y, at, event, stops, circles = self._resets.happen(ended, self._lengths[index], *known, self._resets.at[:, index])
         with np.errstate(all="ignore"):
             returned = ((self._resets.at[:, index] != 0.0) & (at != 0.0)).any(axis=0)
             flight, since = np.where(returned, t - self._start[index], np.nan), t - self.begin[index]
@@ -308,7 +349,13 @@ class _Resetting(_Driver):
             rest_of_series = np.where(ratio < 1.0, ratio / (1.0 - ratio), 0.0)
             settled = (np.abs(ratio - self._ratio[index]) <= SETTLED) & (ratio <= LARGEST_RATIO)
             settled &= flight * rest_of_series <= LEFT_OF_SERIES * since
-            rests = settled | (flight <= NO_FLIGHT * since)
+            in_no_time = (flight <= NO_FLIGHT * since) | (ended.share <= AT_START)
+            anew = t - self._recent[index] > RECENT * since
+            self._recent[index] = np.where(anew, t, self._recent[index])
+            self._changes[index] = np.where(anew, 0, self._changes[index] + 1)
+            often = (self._changes[index] > MOST_IN_A_STEP) & ~(settled | in_no_time | circles)
+            self._resets.often_since[index[often]] = self._recent[index[often]]
+            rests = (settled | in_no_time | circles | often) & ~stops
             limit = np.where(settled, rest_of_series, 0.0)
             self._flight[index], self._ratio[index] = flight, ratio
             for block, earlier in zip((v, y), self._state, strict=True):
@@ -316,11 +363,53 @@ class _Resetting(_Driver):
                 earlier[..., index] = block
         self._rests[index[rests]] = event[rests]
         limit = np.where(settled, t + flight * limit, t)
-        self.stopped_at[index] = np.where(rests, np.minimum(limit, self.end[index]), np.nan)
+        self.stopped_at[index] = np.where(rests | stops, np.minimum(limit, self.end[index]), np.nan)
         for all_stops, block in zip(self.stop_state, (v, y), strict=True):
             all_stops[..., index] = block
         self._start[index], self._resets.at[:, index], self.before[:, index] = t, at, np.nan
-        self._sides[:, index], self.since[index] = 0.0, -np.inf
+        self._due[:, index], self.since[index] = False, -np.inf
+
+    def _let_go(self, index: Whole) -> tuple[Any, Any]:
+        """Which of these members, if they are at rest, an event lets go before the end, and which meet a known time before.
+
+        It is seen at some times, evenly apart, and at jumps, whether it does.
+        """
+        looked = np.flatnonzero((self._rests[index] >= 0) & self._resets.led_back[self._rests[index], index])
+        free, wakes = np.zeros((2, len(index)), dtype=bool)
+        for place in looked:
+            member = index[place : place + 1]
+            begin, end = self.stopped_at[member], self.end[member]
+            nexts = {e: float(timed.after(member, begin)[0][0]) for e, timed in self.timed}
+            first = min(nexts.values(), default=np.inf)
+            wakes[place] = first <= end[0]
+            end = np.minimum(end, first)
+            times = begin + (end - begin) * np.linspace(0.0, 1.0, LOOKS + 1)[1:]
+            if self.jumps is not None:
+                jumps = self.jumps if self.jumps.ndim == 1 else self.jumps[:, member[0]]
+                times = np.sort(np.concatenate([times, np.nextafter(jumps[(jumps >= begin) & (jumps < end)], np.inf)]))
+            many = np.repeat(member, len(times))
+            of_all = self._rests[many], many
+            state = self._state[0][..., many], self._state[1][..., many]
+            holds = self._resets.holds(*of_all, times, self._lengths[many], *state)
+            if holds.all():
+                if wakes[place]:
+                    v, y, numbers = *(each[..., member] for each in self._state), self.members.numbers(member)
+                    for e in range(len(self.events)):
+                        self._sides[e, member] = np.sign(self.quantity(e, end, v, y, numbers))
+                        self._due[e, member] = nexts.get(e) == first
+                    self._shares[member], self.stopped_at[member], self._rests[member] = 1.0, end, -1
+                    self._sizes[:, member] = 0.0
+                continue
+            wakes[place] = False
+            first = int(np.argmin(holds))
+            last = times[first - 1 : first] if first else begin
+            now = self._state[0][..., member], self._state[1][..., member]
+            within = times[first : first + 1] - last
+            share = self._resets.let_go(self._rests[member], member, last, within, self._lengths[member], *now)
+            self._resets.led_back[self._rests[member], member] = self._resets.lain[self._rests[member], member] = False
+            self._start[member], free[place] = last + share * within, True
+            self._rests[member], self._flight[member], self.stopped_at[member] = -1, np.nan, np.nan
+        return free, wakes
 
     def _begun(self, index: Whole, at: Array, rows: Array, v: Array, y: Array) -> tuple[engine.Plan, engine.Pacing, Array]:
         """Plan, pacing and paces of these members at the start of their next parts."""
@@ -342,8 +431,9 @@ class _Resetting(_Driver):
                 each |= first & (at[e] != 0.0)
 
     def parts(self, e: int, steps: Changes) -> Changes:
-        side = self._side(e, steps)
-        parts, stuck = self.within(e, steps, side)
+        begins, zero = steps.t == self._start[steps.member], steps.g == 0.0
+        side = np.where(begins | zero, self._resets.at[e, steps.member], 0.0)
+        parts, stuck = self._resets.from_side(e, steps, side, zero & (~begins | self._resets.lain[e, steps.member]))
         led_back = np.flatnonzero((side != 0.0) & self._resets.led_back[e, steps.member])
         stuck = np.union1d(stuck, led_back)
         soon = (self._side(e, parts) != 0.0) & (parts.high <= NO_TIME)
@@ -353,7 +443,8 @@ class _Resetting(_Driver):
         back = (steps.some(stuck), parts.some(soon))
         there = Changes(*(np.concatenate(pair, axis=-1) for pair in zip(*back, strict=True)))
         none = np.zeros(len(there.t))
-        there = there._replace(low=none, high=none + AT_START, g=self._side(e, there), v_end=there.v, y_end=there.y)
+        side = self._resets.at[e, there.member]
+        there = there._replace(low=none, high=none + AT_START, g=side, v_end=there.v, y_end=there.y)
         parts = parts.some(~soon)
         together = Changes(*(np.concatenate(pair, axis=-1) for pair in zip(there, parts, strict=True)))
         return together.some(np.lexsort((together.high, together.row, together.place)))
@@ -362,8 +453,13 @@ class _Resetting(_Driver):
         """The side from which members came to an event that changed the state where their steps begin; else 0."""
         return np.where(steps.t == self._start[steps.member], self._resets.at[e, steps.member], 0.0)
 
+    def end_at(self, at: Located, due: Any) -> None:
+        """Nothing yet: the run is made up to there first."""
+
     def left(self, member: Whole, place: Whole, row: Whole, longest: Array, out: Attempts, stops: Stops) -> None:
-        self._sides[:, member], self._sizes[:, member] = stops.side[:, place], stops.size[:, place]
+        self._sides[:, member], self._due[:, member] = stops.side[:, place], stops.due[:, place]
+        self._sizes[:, member] = stops.size[:, place]
+        self._shares[member], self._steps[member] = stops.at.share[place], stops.at.step[place]
         plan = self.plan
         self._lengths[member] = out.lengths(plan)[row, place]
         v, y = (np.moveaxis(each, 0, axes) for each, axes in zip((out.v, out.y), plan.block_axes, strict=True))

@@ -8,12 +8,13 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ...base.arrays import Array, Whole
-from ...reference.events import LEAST_SHARE, Parts, located, may_change, parted
+from ...reference.events import LEAST_SHARE, Parts, bends, located, may_change, parted
 from .. import engine
 from ..occurrences import Occurrences
 from .event import Event
 from .members import Members
 from .parts import Changes, Located, nothing, ordinals
+from .timed import Timed, Zeros
 from .traced import Quantity
 from .trials import Trials
 
@@ -34,17 +35,16 @@ Known = Callable[[int, Whole, Whole], Changes]
 
 
 class Stops(NamedTuple):
-    """Which members stop, in which step, at which time and in which state.
+    """Which members end in some steps, in which of these, where they are then, and what occurs there, as ``sides_before`` says.
 
-    For each event ``side`` is the sign of g before it if it stops the member, else 0, and ``size`` the largest |g| around it.
+    ``size`` is for each event the largest |g| at the ends of the part in which it changes its sign.
     """
 
     which: Any
-    step: Whole
-    t: Array
-    v: Array
-    y: Array
+    row: Whole
+    at: Located
     side: Array
+    due: Any
     size: Array
 
 
@@ -54,17 +54,44 @@ class Collected:
     def __init__(self, plan: engine.Plan, events: Sequence[Event], trials: type[Trials] = Trials) -> None:
         self.plan, self.events = plan, events
         self.members = Members(plan)
-        self.quantities = [Quantity(event, plan.system, self.members.numbers(slice(None))) for event in events]
+        values, by_core = self.members.numbers(slice(None)), plan.backend == "rust"
         self.trials = trials(plan, self.members)
+        self.quantities = [self._quantity(event, values, by_core=by_core) for event in events]
         #: Times of a plan that goes backward are negated, but not in occurrences.
         self.sign = -1.0 if plan.backward else 1.0
+        #: The direction of a plan's times.
+        self.way = 1.0 if plan.dt > 0.0 else -1.0
         self.stopped_at = np.full(plan.members, np.nan)
         #: Each quantity one state before those that are searched next; NaN where it is not known.
         self.before = np.full((len(events), plan.members), np.nan)
         self.clear()
 
+    def _quantity(self, event: Event, values: dict[str, Any], *, by_core: bool) -> Quantity | Timed:
+        """The quantity of an event, or its times, if these do not depend on the state."""
+        plan, way = self.plan, -1.0 if self.plan.backward or self.plan.dt < 0.0 else 1.0
+        if event.times is not None:
+            return Timed(event, plan.system, plan.batch, way)
+        quantity = Quantity(event, plan.system, values, by_core=by_core)
+        if quantity.of_time_alone:
+            t0, zeros = float(np.min(plan.t0)), Zeros(quantity, values)
+            if zeros.solved(t0 - 1.0, t0 + 1.0) is not None:
+                return Timed(event, plan.system, plan.batch, way, zeros)
+        return quantity
+
+    @property
+    def timed(self) -> list[tuple[int, Timed]]:
+        """The events with known times, and their numbers."""
+        return [(e, each) for e, each in enumerate(self.quantities) if isinstance(each, Timed)]
+
+    def cover(self, begin: Any, end: Any) -> None:
+        """Know the times of events from one time of the plan to another."""
+        for _, each in self.timed:
+            each.cover(self.sign * float(np.min(begin)), self.sign * float(np.max(end)))
+
     def clear(self) -> None:
         """Remove all occurrences."""
+        #: With adaptive steps by the core: the members whose steps a saved time changed.
+        self.other_steps = np.zeros(self.plan.members, dtype=bool)
         self.count = np.zeros((len(self.events), self.plan.members), dtype=np.int64)
         self.entries: list[list[Located]] = [[] for _ in self.events]
         self.waiting: list[list[Changes]] = [[] for _ in self.events]
@@ -89,6 +116,8 @@ class Collected:
 
         if not len(member):
             return steps, member
+        if isinstance(timed := self.quantities[e], Timed):
+            return self._at_times(timed, steps), member[:0]
         slope, slope_end = (
             self.slope(e, member, at_time, h, *state)
             for at_time, state in ((t, (steps.v, steps.y)), (t + h, (steps.v_end, steps.y_end)))
@@ -106,15 +135,58 @@ class Collected:
         of = steps.some(parts.of)._replace(low=parts.low, high=parts.high, g=parts.g_low, g_end=parts.g_high)
         return of._replace(v_end=parts.v, y_end=parts.y), stuck
 
+    def _at_times(self, timed: Timed, steps: Changes) -> Changes:
+        """The times of an event in these steps, as parts without a length."""
+        found, of, key = [], np.arange(len(steps.t)), self.way * steps.t
+        while len(of):
+            key, sign = timed.after(steps.member[of], key)
+            inside = key <= self.way * steps.t_end[of]
+            of, key = of[inside], key[inside]
+            found.append((of, key, sign[inside]))
+        of, key, sign = (np.concatenate(each) for each in zip(*found, strict=True))
+        here = sign * timed.event.direction <= 0.0
+        order = np.flatnonzero(here)[np.lexsort((key[here], of[here]))]
+        some, t, sign = steps.some(of[order]), self.way * key[order], sign[order]
+        if not len(t):
+            return some
+        v, y = self.trials.step(some.member, some.t, t - some.t, some.v, some.y)
+        at_end = t == some.t_end
+        v, y = (np.where(at_end, *each) for each in zip((some.v_end, some.y_end), (v, y), strict=True))
+        share = np.where(at_end, 1.0, (t - some.t) / some.h)
+        return some._replace(low=share, high=share, g=sign, g_end=-sign, v_end=v, y_end=y)
+
     def quantity(self, e: int, t: Array, v: Array, y: Array, numbers: dict[str, Any]) -> Array:
         """The quantity of one event at times of the plan."""
         return self.quantities[e](self.sign * t, v, y, numbers)
 
-    def may_change(self, e: int, index: Whole, g: Array) -> Any:
-        """In which steps of these members an event may change its sign, from its values at their ends."""
+    def may_change(self, e: int, index: Whole, t: Array, g: Array) -> Any:
+        """In which steps of these members an event may change its sign, from the times and its values at their ends."""
+        if isinstance(timed := self.quantities[e], Timed):
+            key = np.broadcast_to(self.way * t, g.shape)
+            return timed.after(index, key[:-1])[0] <= key[1:]
         may = may_change(self.before[e, index], g)
         self.before[e, index] = g[-2]
         return may
+
+    def may_bend(self, e: int, index: Whole, t: Array, h: Array, v: Array, y: Array, g: Array) -> Any:
+        """In which adaptive steps of these members an event may change its sign twice, from values and slopes at their ends.
+
+        Args:
+            e: the number of the event.
+            index: the members.
+            t: times before the first step and after each, shape (steps + 1, members).
+            h: lengths of the steps, shape (steps, members).
+            v: velocities at these times, shape (*block, steps + 1, members).
+            y: coordinates there.
+            g: the quantity there, shape (steps + 1, members).
+        """
+        many, lengths = np.tile(index, len(t)), np.concatenate([h, h[-1:]])
+        flat = (each.reshape(*each.shape[:-2], t.size) for each in (v, y))
+        with np.errstate(all="ignore"):
+            slope = self.slope(e, many, t.reshape(-1), lengths.reshape(-1), *flat).reshape(t.shape)
+            end = slope[1:] * (lengths[:-1] / lengths[1:])
+        of, low, high, unused = np.zeros(h.shape, dtype=np.int64), np.zeros(h.shape), np.ones(h.shape), np.zeros((0, *h.shape))
+        return bends(Parts(of, low, high, g[:-1], g[1:], slope[:-1], end, unused, unused))
 
     def slope(self, e: int, index: Any, t: Array, h: Array, v: Array, y: Array) -> Array:
         """By how much the quantity would change in a step at the present rates."""
@@ -155,24 +227,49 @@ class Collected:
         return ordinals(member) + self.count[e, member] >= event.terminal if event.terminal else np.zeros(len(member), dtype=bool)
 
     def _stopped(self, index: Whole, in_last: list[tuple[Located, Changes]], last: Whole, stops: Any) -> Stops:
-        """Stop members at the first terminal event of their last step."""
-        end, times = np.full(len(index), np.inf), np.full(len(index), np.nan)
-        v, y = (np.empty((*shape, len(index))) for shape in (self.plan.system.v_shape, self.plan.system.y_shape))
-        side, size = np.zeros((2, len(self.events), len(index)))
+        """End members at the first event of their last step that ends them."""
+        share, times = np.full(len(index), np.inf), np.full(len(index), np.nan)
+        v, y = (np.full((*shape, len(index)), np.nan) for shape in (self.plan.system.v_shape, self.plan.system.y_shape))
+        step, size = np.zeros(len(index), dtype=np.int64), np.zeros((len(self.events), len(index)))
         for e, (each, changes) in enumerate(in_last):
             member = changes.place
             first = np.flatnonzero(self.ends(e, each.member))
             first = first[np.unique(member[first], return_index=True)[1]]
-            first = first[each.share[first] <= end[member[first]]]
+            first = first[each.share[first] < share[member[first]]]
             ends, who = each.some(first), member[first]
-            side[:, who] = np.where(ends.share < end[who], 0.0, side[:, who])
-            side[e, who], size[e, who] = np.sign(changes.g[first]), np.maximum(np.abs(changes.g), np.abs(changes.g_end))[first]
-            end[who], times[who], v[..., who], y[..., who] = ends.share, ends.t, ends.v, ends.y
+            share[who], times[who], step[who], v[..., who], y[..., who] = ends.share, ends.t, ends.step, ends.v, ends.y
+            np.maximum.at(size[e], member, np.maximum(np.abs(changes.g), np.abs(changes.g_end)))
+        at = Located(index, step, share, times, v, y)
+        side, due = self.sides_before(in_last, at)
         for e, (each, changes) in enumerate(in_last):
-            # Later ones are not in the run; and a member that rests at the event does not cross it.
-            self.note(e, each.some((each.share <= end[changes.place]) & (each.share > AT_START)))
+            self.note(e, each.some(each.share < share[changes.place]))  # later ones are not in the run
         self.stopped_at[index[stops]] = times[stops]
-        return Stops(stops, last, times, v, y, side, size)
+        self.end_at(at, due)
+        return Stops(stops, last, at, side, due, size)
+
+    def end_at(self, at: Located, due: Any) -> None:
+        """What occurs where members end: all that is due, since nothing changes their states."""
+        for e, each in enumerate(due):
+            self.note(e, at.some(each))
+
+    def sides_before(self, found: list[tuple[Located, Changes]], at: Located) -> tuple[Array, Any]:
+        """For each event the side of its quantity just before an instant of some members, and whether it occurs then.
+
+        Where its change of sign was located at the instant or later, in a part that begins before, the side is that of the part's
+        beginning. It occurs if it was located just there, or if its quantity is across or at zero, as it may be by roundings.
+        """
+        numbers, due = self.members.numbers(at.member), np.zeros((len(self.events), len(at.member)), dtype=bool)
+        side = np.array([np.sign(self.quantity(e, at.t, at.v, at.y, numbers)) for e in range(len(self.events))])
+        for e, (each, changes) in enumerate(found):
+            share, timed = at.share[changes.place], isinstance(self.quantities[e], Timed)
+            around = (each.t * self.way <= at.t[changes.place] * self.way if timed else changes.low <= share) & (
+                share <= each.share
+            )
+            around[around] = ordinals(changes.place[around]) == 1
+            who, came = changes.place[around], np.sign(changes.g[around])
+            due[e, who] = (each.share[around] == at.share[who]) | (came * side[e, who] <= 0.0) | timed
+            side[e, who] = came
+        return side, due
 
     def note(self, e: int, entries: Located) -> None:
         """Count these, and keep the first ones."""
@@ -197,6 +294,9 @@ class Collected:
     def located(self, e: int, changes: Changes) -> Located:
         """Locate these changes of sign."""
         member, t, length = changes.member, changes.t, changes.h
+        if isinstance(timed := self.quantities[e], Timed):
+            at = self.way * timed.nearest(member, self.way * (t + changes.high * length))
+            return Located(member, changes.step, changes.high, at, changes.v_end, changes.y_end)
 
         def trial(which: Any, share: Array) -> tuple[Array, Array, Array]:
             index, h = member[which], share * length[which]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from math import prod
 from typing import Any
 
@@ -10,9 +11,10 @@ import numpy as np
 
 from ...base import checks
 from ...base.arrays import Array, Whole
-from ...reference.events import near
 from .. import engine
+from ..engine.direct import run_by_core
 from ..result import Status
+from . import by_core
 from .collected import Collected, Known
 from .event import Event, names_of_changing
 from .parts import At, Changes
@@ -25,15 +27,6 @@ NUMBERS_AT_ONCE = 1 << 17
 LEAST_STEPS = 16
 #: Few steps are made first, since a member may stop early; then four times as many together each time, up to the most.
 FIRST_STEPS, MOST_STEPS = 64, 1 << 13
-#: Where the core notices changes of sign, this many steps are made at once, and those of members with a change are repeated.
-#: Next time twice as many if fewer than the first share of the members had one, half as many if more than the second had.
-WATCHED_STEPS, FEW_NOTICED, MANY_NOTICED = 64, 1 / 16, 1 / 4
-#: If more than this share has one in the fewest steps, all states are searched from then on.
-TOO_MANY_NOTICED = 1 / 2
-#: All states of fewer members than this are searched: a repetition would take longer.
-FEW_MEMBERS = 64
-#: Where states are saved more often than this many steps apart, all are searched instead.
-LEAST_BETWEEN_SAVES = 32
 
 
 def advanced(plan: engine.Plan, at: At) -> engine.Outcome:
@@ -93,9 +86,6 @@ class _Driver(Collected):
         self.slot = np.empty((*plan.slot_shape[: plan.slot_axes], total))
         self.first_bad = np.full(total, -1, dtype=np.int64)
         self.done = 0
-        #: Members with a quantity that is near zero at the end of the last steps.
-        self.close = np.zeros(total, dtype=bool)
-        self.watched: engine.Watched | None = None
 
     def run(self, v: Array, y: Array, before: Whole | None, carried: bool) -> engine.Outcome:
         plan, total = self.plan, self.plan.members
@@ -104,51 +94,46 @@ class _Driver(Collected):
         v, y = v.reshape(*v.shape[:axes], total), y.reshape(*plan.system.y_shape, total)
         bad = self.first_bad.copy() if before is None else before.reshape(-1)
         size = max(1, NUMBERS_AT_ONCE // numbers)
-        # In float32 the core's quantities are too coarse to notice all changes of sign.
-        if (
-            plan.backend == "rust"
-            and not plan.fused
-            and not plan.single
-            and (plan.every is None or plan.every >= LEAST_BETWEEN_SAVES)
-        ):
-            self.watched = watched(self.quantities, self.members.plan(np.arange(min(2, total))))
+        self.cover(plan.t0 + plan.first * plan.dt, plan.t0 + (plan.first + plan.steps) * plan.dt)
+        if not any(event.then for event in self.events) and (looked := by_core.sought(self)) is not None:
+            return self._by_core(looked, v, y, bad, carried)
         for first in range(0, total, size):
             index = np.arange(first, min(first + size, total))
             self._group(index, At(v[..., index], y[..., index], bad[index], carried), size)
+        self._rest(size)
         return self._outcome()
 
-    def _group(self, index: Whole, at: At, most: int, done: int = 0, notices: bool = True) -> None:
+    def _by_core(self, sought: by_core.Sought, v: Array, y: Array, bad: Whole, carried: bool) -> engine.Outcome:
+        """The run by the core, which looks for the events itself."""
+        plan, batch = self.plan._replace(record=()), self.plan.batch
+        if not plan.begins:
+            noticing = watched(self.quantities, self.members.plan(np.arange(min(2, plan.members))))
+            plan = plan._replace(watched=None if noticing.quantities.reads_time else noticing)
+        v, y = v.reshape((*v.shape[:-1], *batch)), y.reshape((*y.shape[:-1], *batch))
+        out = run_by_core(plan, engine.model(plan), v, y, bad.reshape(batch), carried, make=partial(by_core.made, self, sought))
+        if plan.progress is not None:
+            plan.progress(1.0)
+        return out
+
+    def _rest(self, size: int) -> None:
+        """What is left to do of some members."""
+
+    def _group(self, index: Whole, at: At, most: int, done: int = 0) -> None:
         """All further steps of some members; those that stop leave the group."""
-        plan, piece, together = self.plan, FIRST_STEPS, WATCHED_STEPS
+        plan, piece = self.plan, FIRST_STEPS
         some = self.members.plan(index)
         while done < plan.steps and len(index):
             now = some._replace(first=plan.first + done, record=(), progress=None)
-            noticing = notices and self.watched is not None and len(index) >= FEW_MEMBERS
             size = max(1, most // LEAST_STEPS)
-            if not noticing and len(index) > size:  # too few states of so many members fit
+            if len(index) > size:  # too few states of so many members fit
                 for first in range(0, len(index), size):
                     these = np.arange(first, min(first + size, len(index)))
-                    self._group(index[these], at.some(these), most, done, notices)
+                    self._group(index[these], at.some(these), most, done)
                 return
-            if noticing and done > 0:
-                now = now._replace(steps=min(together, self._next_save(done) - done), every=None, watched=self.watched)
-                out = advanced(now, at)
-                if out.noticed is None or np.isnan(out.noticed[-1]).any():
-                    self.watched = None  # steps too long for one tape
-                    continue
-                stopped, share = self._look_again(now, index, at, out, done, most)
-                if share < FEW_NOTICED:
-                    together = min(2 * together, MOST_STEPS)
-                elif share > MANY_NOTICED and together > LEAST_STEPS and len(index) * together > most:
-                    together //= 2
-                elif share > TOO_MANY_NOTICED:
-                    notices = False
-            else:
-                longest = 1 if noticing else min(piece, most // len(index), MOST_STEPS)
-                now = now._replace(steps=min(max(1, longest), plan.steps - done), every=1)
-                out = advanced(now, at)
-                self._save(done, now.steps, index, out.v, out.y)
-                stopped = self._look(now, index, out, done)
+            now = now._replace(steps=min(max(1, min(piece, most // len(index), MOST_STEPS)), plan.steps - done), every=1)
+            out = advanced(now, at)
+            self._save(done, now.steps, index, out.v, out.y)
+            stopped = self._look(now, index, out, done)
             self.done += now.steps * len(index)
             done, piece = done + now.steps, 4 * piece
             at = At(out.slot, out.y[-1], out.first_bad, True)
@@ -162,37 +147,6 @@ class _Driver(Collected):
                     some = self.members.plan(index)
             if plan.progress is not None:
                 plan.progress(self.done / (plan.steps * plan.members))
-
-    def _look_again(self, now: engine.Plan, index: Whole, at: At, out: engine.Outcome, done: int, most: int) -> Any:
-        """Repeat the steps of members with a change of sign. Returns which members stop, and the share that was repeated."""
-        assert out.noticed is not None
-        if done + now.steps == self._next_save(done):
-            self._save(done + now.steps, 0, index, out.v, out.y)
-        end, parameters = now.t0 + (now.first + now.steps) * now.dt, self.members.numbers(index)
-        noticed = (out.noticed[-1] > 0.0) | self.close[index]
-        self.close[index] = False
-        for e, (quantity, before) in enumerate(zip(self.quantities, out.noticed, strict=False)):
-            g = quantity(np.array(end), out.v[-1], out.y[-1], parameters)
-            self.close[index] |= near(g, before)
-            noticed |= near(g, before) | near(before, g)
-            self.before[e, index] = before
-        stopped, where = np.zeros(len(index), dtype=bool), np.flatnonzero(noticed)
-        size = max(1, most // now.steps)
-        for first in range(0, len(where), size):
-            these = where[first : first + size]
-            again = self.members.plan(index[these])
-            again = now._replace(system=again.system, batch=again.batch, t0=again.t0, force=again.force, every=1, watched=None)
-            then = at.some(these)
-            states = advanced(again, then)
-            last = self.before[:, index[these]]
-            self.before[:, index[these]] = np.nan
-            stopped[these] = self._look(again, index[these], states, done)
-            self.before[:, index[these]] = last
-        return stopped, len(where) / len(index)
-
-    def _next_save(self, done: int) -> int:
-        """The next step whose state is saved."""
-        return int(self.saves[np.searchsorted(self.saves, done, "right")])
 
     def _save(self, done: int, steps: int, index: Whole, *states: Array) -> None:
         """Save the states at the steps of ``saves``."""
@@ -212,7 +166,7 @@ class _Driver(Collected):
         t: Any = now.t0 + ((now.first + np.arange(now.steps + 1)) * now.dt)[:, np.newaxis]
         parameters = self.members.numbers(index)
         g = [quantity(t, v, y, parameters) for quantity in self.quantities]
-        may = [self.may_change(e, index, each) for e, each in enumerate(g)]
+        may = [self.may_change(e, index, t, each) for e, each in enumerate(g)]
         if (out.first_bad >= 0).any():
             ends = now.first + np.arange(1, now.steps + 1)[:, np.newaxis]
             may = [each & ((out.first_bad < 0) | (ends < out.first_bad)) for each in may]
@@ -221,9 +175,9 @@ class _Driver(Collected):
             begins, ends = ([each[..., row + later, place] for each in states] for later in (0, 1))
             number = now.first + row
             low, high, h = np.zeros(len(row)), np.ones(len(row)), np.full(len(row), now.dt)
-            begin: Any = now.t0_of(place) + number * now.dt
+            begin, end = (now.t0_of(place) + (number + later) * now.dt for later in (0, 1))
             values = g[e][row, place], g[e][row + 1, place]
-            return Changes(row, place, index[place], number, begin, h, low, high, *values, *begins, *ends)
+            return Changes(row, place, index[place], number, begin, h, end, low, high, *values, *begins, *ends)
 
         return known, may
 
@@ -233,10 +187,10 @@ class _Driver(Collected):
         stops = self.take(index, now.steps, [self.changes(e, each, known) for e, each in enumerate(may)])
         if stops is None:
             return np.zeros(len(index), dtype=bool)
-        after = np.searchsorted(self.saves, done + stops.step, "right")
+        after = np.searchsorted(self.saves, done + stops.row, "right")
         for place in np.unique(after[stops.which]):
             these = stops.which & (after == place)
-            for saved, state in zip(self.saved, (stops.v, stops.y), strict=True):
+            for saved, state in zip(self.saved, (stops.at.v, stops.at.y), strict=True):
                 saved[place:][..., index[these]] = state[..., these]
         return stops.which
 
@@ -264,6 +218,8 @@ class _Resetting(_Driver):
         super().__init__(plan, events)
         self.resets = Resets(self)
         self.rests = np.full(plan.members, -1)
+        #: Members that events let go later: where they are then, and how many steps are made before.
+        self.later: list[tuple[Whole, At, int]] = []
 
     def run(self, v: Array, y: Array, before: Whole | None, carried: bool) -> engine.Outcome:
         plan = self.plan
@@ -273,7 +229,12 @@ class _Resetting(_Driver):
             self.resets.begin(t, np.full(plan.members, plan.dt), *states)
         return super().run(v, y, before, carried)
 
-    def _group(self, index: Whole, at: At, most: int, done: int = 0, notices: bool = True) -> None:
+    def _rest(self, size: int) -> None:
+        while self.later:
+            index, at, done = self.later.pop()
+            self._group(index, at, size, done)
+
+    def _group(self, index: Whole, at: At, most: int, done: int = 0) -> None:
         plan, piece, some = self.plan, FIRST_STEPS, self.members.plan(index)
         while done < plan.steps and len(index):
             size = max(1, most // LEAST_STEPS)
@@ -287,14 +248,16 @@ class _Resetting(_Driver):
             out = advanced(now, at)
             before = self.before[:, index]
             known, may = self._may(now, index, out)
-            changes = [self.changes(e, each, known) for e, each in enumerate(may)]
+            steps_of = [known(e, *np.nonzero(each)) for e, each in enumerate(may)]
+            changes, held = zip(*(self.resets.within(e, each) for e, each in enumerate(steps_of)), strict=True)
             # All members go to the end of the first step in which one of them stops or goes on from another state.
-            rows = [each.row[self.ends(e, each.member)] for e, each in enumerate(changes)]
-            row = 0 if self.resets.at[:, index].any() else min([steps, *(each.min() for each in rows if len(each))])
-            at_event: Any = self.resets.at[:, index].any(axis=0) & (row == 0)
-            for e, each in enumerate(changes):
-                ends = self.ends(e, each.member) & (each.row == row)
-                at_event[each.place[ends]] = True
+            ends = [each.some(self.ends(e, each.member)) for e, each in enumerate(changes)]
+            ends += [each.some(where) for each, where in zip(steps_of, held, strict=True)]
+            fresh = self.resets.fresh(index)
+            row = 0 if fresh.any() else min([steps, *(each.row.min() for each in ends if len(each.row))])
+            at_event: Any = fresh & (row == 0)
+            for each in ends:
+                at_event[each.place[each.row == row]] = True
             now = now._replace(steps=min(row + 1, steps))
             if now.steps < steps:
                 self.before[:, index] = before
@@ -303,6 +266,9 @@ class _Resetting(_Driver):
             self.take(
                 index, now.steps, [each.some((each.row < row) | ((each.row == row) & ~at_event[each.place])) for each in changes]
             )
+            others, t = np.flatnonzero(~at_event), now.t0 + (now.first + now.steps) * now.dt
+            t = np.broadcast_to(t, now.batch)[others]
+            self.resets.leave(index[others], t, out.v[-1][..., others], out.y[-1][..., others])
             slot: Array = out.slot
             gone: Any = np.zeros(len(index), dtype=bool)
             if row < steps:
@@ -314,12 +280,40 @@ class _Resetting(_Driver):
             if gone.any():
                 self._stay(index, gone, out, done + row)
                 self.done += int(gone.sum()) * (plan.steps - done - now.steps)
+                self._wait(index[gone], out.v[-1][..., gone], out.y[-1][..., gone], done + now.steps)
                 index, at = index[~gone], at.some(~gone)
                 some = self.members.plan(index) if len(index) else some
             self.done += now.steps * len(gone)
             done, piece = done + now.steps, 2 * now.steps if row < steps else 4 * piece
             if plan.progress is not None:
                 plan.progress(self.done / (plan.steps * plan.members))
+
+    def _wait(self, index: Whole, v: Array, y: Array, done: int) -> None:
+        """Go on later with members at rest, from the first step at whose end the event that holds them does so no longer."""
+        plan, held = self.plan, np.flatnonzero((self.rests[index] >= 0) & self.resets.led_back[self.rests[index], index])
+        h = np.full(len(index), plan.dt)
+        while len(held) and done < plan.steps:
+            steps = min(max(1, NUMBERS_AT_ONCE // (len(held) * max(1, len(v) + len(y)))), MOST_STEPS, plan.steps - done)
+            t = plan.t0_of(index[held]) + (plan.first + done + 1 + np.arange(steps)[:, np.newaxis]) * plan.dt
+            places = np.tile(held, steps)
+            t = np.broadcast_to(t, (steps, len(held))).reshape(-1)
+            state = v[..., places], y[..., places]
+            holds = self.resets.holds(self.rests[index[places]], index[places], t, h[places], *state)
+            for _, timed in self.timed:
+                holds &= timed.after(index[places], self.way * (t - plan.dt))[0] > self.way * t
+            holds = holds.reshape(steps, len(held))
+            first = np.where(holds.all(axis=0), steps, np.argmin(holds, axis=0))
+            for step in np.unique(first[first < steps]):
+                some = held[first == step]
+                member, begin = index[some], done + int(step)
+                slot: Array = v[..., some]
+                if plan.method.begins:
+                    anew = self.members.plan(member)._replace(first=plan.first + begin)
+                    slot = engine.to_slot(anew, v[..., some], y[..., some])
+                self.later.append((member, At(slot, y[..., some], np.full(len(some), -1), True), begin))
+                self.rests[member], self.stopped_at[member] = -1, np.nan
+                self.done -= len(some) * (plan.steps - begin)
+            held, done = held[first == steps], done + steps
 
     def _through(
         self, now: engine.Plan, index: Whole, out: engine.Outcome, known: Known, which: Whole, row: int

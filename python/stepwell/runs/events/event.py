@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...base import checks
+from ...base.arrays import Array
 from ...base.immutable import Immutable, ValueEquality
 from ...errors import ArgumentError, DTypeError
 
@@ -25,6 +26,9 @@ class Event(Immutable, ValueEquality):
     Args:
         function: ``g(t, v, y)``, or ``g(t, y)`` for a system without velocities, that returns one number; written for one member,
             in NumPy style, as your own equations are. Further arguments are parameters of the system, by name.
+        times: in place of a function, the times at which it occurs, after the start: a number, several, or shape (times, *batch)
+            with some for each member, where NaN is no time.
+        period: after each of ``times`` it occurs again and again, so much later each time; a number, or one for each member.
         direction: 1 or "rising" for changes from below zero to above, −1 or "falling" for those from above to below, 0 or "both".
             If None, as an attribute ``direction`` of the function says, as SciPy reads it; 0 without one.
         terminal: whether a member stops at the first such change; a whole number n stops it at the n-th. If None, as an attribute
@@ -32,7 +36,7 @@ class Event(Immutable, ValueEquality):
         then: ``then(t, v, y)``, which returns the state (v, y) from which a member goes on at each such change; for a system
             without velocities ``then(t, y)``, which returns y. It is written as ``function`` is, and may take parameters too.
         most: for each member the first ``most`` occurrences are kept; all are counted.
-        name: its name in ``run.events``; if None, that of the function.
+        name: its name in ``run.events``; if None, that of the function, and with ``times`` that of ``then``, or "times".
 
     Raises:
         ArgumentError: what is wrong with an argument.
@@ -42,19 +46,39 @@ class Event(Immutable, ValueEquality):
         >>> run = sw.integrate(sw.Oscillator(), "rk4", v=0.0, y=1.0, dt=0.1, steps=100, events=down)
         >>> run.events["down"].t.round(4)  # π/2, and a whole turn later
         array([1.5708, 7.854 ])
+        >>> decay = sw.system(order=1)(lambda t, c: -0.1 * c)
+        >>> dose = sw.Event(times=8.0, period=8.0, then=lambda t, c: c + 1.0, name="dose")
+        >>> run = sw.integrate(decay(), "dop853", y=1.0, tolerance=1e-6, at=[24.0], events=dose)
+        >>> run.events["dose"].t, float(run.y[-1].round(4))
+        (array([ 8., 16., 24.]), 1.7419)
     """
 
     def __init__(
         self,
-        function: Callable[..., Any],
+        function: Callable[..., Any] | None = None,
         *,
+        times: Any = None,
+        period: Any = None,
         direction: int | Direction | None = None,
         terminal: bool | int | None = None,
         then: Callable[..., Any] | None = None,
         most: int = MOST_KEPT,
         name: str | None = None,
     ) -> None:
-        if not inspect.isfunction(function):
+        if (function is None) == (times is None):
+            raise ArgumentError(
+                f"function, times: expected either a function g(t, v, y) or the times of the event, got "
+                f"{'both' if times is not None else 'neither'}"
+            )
+        self.times, self.period = None if times is None else _times(times), None
+        if times is not None:
+            if period is not None:
+                self.period = _fixed(np.array(checks.numbers("period", period, positive=True, unit="units of time")))
+            if direction is not None:
+                raise ArgumentError("direction: listed times have none; leave it out")
+        elif period is not None:
+            raise ArgumentError("period: goes with times=; the zeros of a function repeat by themselves")
+        elif not inspect.isfunction(function):
             raise DTypeError(
                 f"function: expected a Python function such as g(t, v, y), got {checks.short(function)} "
                 f"({type(function).__name__})"
@@ -72,7 +96,7 @@ class Event(Immutable, ValueEquality):
             raise ArgumentError("then, terminal: a member that stops at an event does not go on from a new state; leave one out")
         self.then = then
         self.most = checks.count("most", most, 1)
-        self.name = function.__name__ if name is None else name
+        self.name = getattr(function or then, "__name__", "times") if name is None else name
 
     def __repr__(self) -> str:
         options = {"direction": self.direction, "terminal": self.terminal}
@@ -80,6 +104,21 @@ class Event(Immutable, ValueEquality):
             options["then"] = self.then.__name__
         text = "".join(f", {name}={value}" for name, value in options.items() if value)
         return f"Event({self.name}{text})"
+
+
+def _times(times: Any) -> Array:
+    """Times along the first axis; NaN is none."""
+    numbers = np.atleast_1d(np.array(checks.numbers("times", times, finite=False, unit="units of time")))
+    if np.isinf(numbers).any() or np.isnan(numbers).all():
+        raise ArgumentError(
+            f"times: expected finite times, or NaN beside them where a member has fewer, got {checks.short(times)}"
+        )
+    return _fixed(numbers)
+
+
+def _fixed(numbers: Array) -> Array:
+    numbers.setflags(write=False)
+    return numbers
 
 
 def _agreed(name: str, function: Any, argument: Any, read: Callable[[str, Any], Any], otherwise: Any) -> Any:

@@ -20,6 +20,9 @@ from .parts import Changes
 from .resets import Resets, Stretch
 from .trials import Trials
 
+#: The times of events are found for so many steps ahead.
+STEPS_AHEAD = 1 << 10
+
 
 class Frames(Collected):
     """Steps a world with events; used in place of the core's world.
@@ -52,8 +55,8 @@ class Frames(Collected):
         self._occurrences: dict[str, Occurrences] | None = None
         self._all = np.arange(plan.members)
         self._resets = Resets(self) if any(event.then for event in events) else None
-        #: Which members are at rest at an event; and the state and quantities after the last call.
-        self._rests = np.zeros(plan.members, dtype=bool)
+        #: The events at which members are at rest, −1 for others; and the state and quantities after the last call.
+        self._rests = np.full(plan.members, -1)
         self._left: tuple[list[Array], list[Array]] | None = None
 
     def renew(self, plan: engine.Plan) -> None:
@@ -61,27 +64,33 @@ class Frames(Collected):
         self.plan, self.members = plan, Members(plan)
         self.trials = Trials(plan, self.members)
 
-    def step(self, n: int = 1) -> None:
-        """Make n steps in place. ``World.events`` returns their events."""
+    def step(self, n: int = 1) -> bool:
+        """Make n steps in place. ``World.events`` returns their events. Whether a number of the state is not finite then."""
         n = checks.count("n", n, 0)
         if self.refresh is not None:
             self.refresh()
         self.clear()
         self._occurrences = None
+        begin = self.plan.t0 + self._loop.step_number * self.plan.dt
+        for _, timed in self.timed:
+            if not timed.covers(begin, begin + n * self.plan.dt):
+                timed.cover(begin, begin + max(n, STEPS_AHEAD) * self.plan.dt)
         g = self._quantities(self._loop.step_number)
         self._start_from(g)
         for _ in range(n):
             step, before = self._loop.step_number, [each.copy() for each in self._blocks]
             self._loop.step(1)
             after = self._quantities(self._loop.step_number)
-            may = [self.may_change(e, self._all, np.stack(ends)) for e, ends in enumerate(zip(g, after, strict=True))]
-            if np.any(may) or (self._resets is not None and self._resets.at.any()):
+            t: Any = self.plan.t0 + np.array([[step], [step + 1]]) * self.plan.dt
+            may = [self.may_change(e, self._all, t, np.stack(ends)) for e, ends in enumerate(zip(g, after, strict=True))]
+            if np.any(may) or (self._rests >= 0).any() or (self._resets is not None and self._resets.fresh(self._all).any()):
                 g = self._after_a_step(step, may, g, after, before)
             else:
                 g = after
         for e in range(len(self.events)):
             self.locate_waiting(e)
         self._left = [each.copy() for each in self._blocks], g
+        return not all(np.isfinite(each).all() for each in self._blocks)
 
     def _start_from(self, g: list[Array]) -> None:
         """Begin a call with these quantities. The search starts anew for members that the user moved since the last call."""
@@ -96,7 +105,7 @@ class Frames(Collected):
         for now, then in zip(self._flat(self._blocks), self._flat(blocks), strict=True):
             moved |= (now != then).any(axis=tuple(range(now.ndim - 1)))
         self.before[:, moved] = np.nan
-        self._rests &= ~moved
+        self._rests[moved] = -1
         if self._resets is not None:
             changed = [now != then for now, then in zip(g, last, strict=True)]
             self._resets.begin_again(t, h, v, y, g, changed, moved)
@@ -131,35 +140,43 @@ class Frames(Collected):
             self.trials = Trials(self.plan._replace(force=force), self.members)
         states = *self._flat(before), *self._flat(self._blocks)
         finite = np.logical_and.reduce([np.isfinite(each).all(axis=tuple(range(each.ndim - 1))) for each in states[2:]])
-        t = self.plan.t0 + step * self.plan.dt
+        t, end = (self.plan.t0 + each * self.plan.dt for each in (step, step + 1))
 
         def known(e: int, row: Whole, place: Whole) -> Changes:
-            number, times, lengths = (np.full(len(place), each) for each in (step, t, self.plan.dt))
+            number, times, lengths, ends = (np.full(len(place), each) for each in (step, t, self.plan.dt, end))
             low, high, values = np.zeros(len(row)), np.ones(len(row)), (g[e][place], after[e][place])
             v, y, v_end, y_end = (each[..., place] for each in states)
-            return Changes(row, place, place, number, times, lengths, low, high, *values, v, y, v_end, y_end)
+            return Changes(row, place, place, number, times, lengths, ends, low, high, *values, v, y, v_end, y_end)
 
-        changes = [self.changes(e, each & finite & ~self._rests, known) for e, each in enumerate(may)]
+        rests = self._rests >= 0
+        steps_of = [known(e, *np.nonzero(each & finite & ~rests)) for e, each in enumerate(may)]
         if self._resets is None:
-            self.take(self._all, 1, changes)
+            self.take(self._all, 1, [self.within(e, each)[0] for e, each in enumerate(steps_of)])
             return after
-        goes_through = self._resets.at.any(axis=0) & finite
-        for e, each in enumerate(changes):
+        changes, held = zip(*(self._resets.within(e, each) for e, each in enumerate(steps_of)), strict=True)
+        goes_through = (self._resets.fresh(self._all) | rests) & finite
+        for e, (each, where) in enumerate(zip(changes, held, strict=True)):
             goes_through[each.place[self.ends(e, each.member)]] = True
+            goes_through[steps_of[e].place[where]] = True
         self.take(self._all, 1, [each.some(~goes_through[each.place]) for each in changes])
-        index = np.flatnonzero(goes_through)
+        index, others = np.flatnonzero(goes_through), np.flatnonzero(~goes_through)
+        self._resets.leave(others, np.full(len(others), end), *(each[..., others] for each in states[2:]))
         if not len(index):
             return after
-        lying = self._rests[index]
+        ends, lengths = np.full(len(index), end), np.full(len(index), self.plan.dt)
+        lying = self._resets.holds(self._rests[index], index, ends, lengths, *(each[..., index] for each in states[:2]))
         v, y = (each[..., index].copy() for each in states[:2])  # members at rest stay at rest
+        for _, timed in self.timed:
+            comes = timed.after(index, np.full(len(index), self.way * t))[0] <= self.way * end
+            lying &= ~(comes & self._resets.led_back[self._rests[index], index])
         if not lying.all():
             moves = index[~lying]
-            begin, end = np.full(len(moves), t), self.plan.t0 + (step + 1) * self.plan.dt
+            begin = np.full(len(moves), t)
             v_now, y_now, v_end, y_end = (each[..., moves] for each in states)
             steps, at = np.full(len(moves), step), self._resets.at[:, moves]
             arrived = self._resets.through(Stretch(moves, steps, begin, end - begin, v_now, y_now, v_end, y_end, at))
             v[..., ~lying], y[..., ~lying] = arrived.v, arrived.y
-            self._resets.at[:, moves], self._rests[moves] = arrived.at, arrived.rests >= 0
+            self._resets.at[:, moves], self._rests[moves] = arrived.at, arrived.rests
         self._write(step + 1, index, v, y)
         self.before[:, index] = np.nan
         return self._quantities(step + 1)

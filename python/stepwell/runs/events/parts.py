@@ -34,6 +34,7 @@ class Changes(NamedTuple):
         step: the number of the step.
         t: the time at its start.
         h: its length.
+        t_end: the time at its end, where the next one begins.
         low: the share of the step where the part begins.
         high: where it ends.
         g: the quantity where the part begins.
@@ -50,6 +51,7 @@ class Changes(NamedTuple):
     step: Whole
     t: Array
     h: Array
+    t_end: Array
     low: Array
     high: Array
     g: Array

@@ -9,9 +9,10 @@ import numpy as np
 from ...base.arrays import Array, Whole
 from ...base.reprs import first_of, share
 from ...errors import EventWarning
+from ...reference.events import located
 from ..findings import Finding
-from .collected import Collected
-from .parts import Changes
+from .collected import AT_START, Collected
+from .parts import Changes, Located
 from .traced import NewState
 
 #: A member whose state was changed more often than this within one step is at rest.
@@ -27,6 +28,8 @@ NO_TIME = 2.0**-100
 #: After an event changed its state, a member is still at the event if |g| is at most this many times its value before, or the
 #: share ``LEAST_LEFT`` of its values at the ends of the step. Else its state is elsewhere, as that of a neuron after a spike.
 AT = 8.0
+#: At one instant each event occurs so many times at most. If its members then are not done, their events set each other off.
+MOST_AT_ONCE = 100
 #: Whether an event leads a member back to itself is tested with the state this share of a step later.
 FURTHER = 2.0**-10
 
@@ -66,19 +69,36 @@ class Stretch(NamedTuple):
         return Stretch(*parts)
 
 
-class Ahead(NamedTuple):
-    """What ends some stretches: the share of each, infinite if nothing does, whether the run stops there, and the state after it.
+class After(NamedTuple):
+    """What members are after an instant at which events occurred.
 
-    ``event`` is the number of the event that changed the state, −1 without one.
+    Attributes:
+        v: velocities, shape (*block, n).
+        y: coordinates.
+        at: for each event the side from which members came that are at it since it changed their state; 0 for others.
+        event: the number of the last event that changed the state; −1 without one.
+        stops: which members a terminal event stopped.
+        circles: which members are given up, since their events set each other off again and again.
     """
 
-    share: Array
-    stops: Any
-    t: Array
     v: Array
     y: Array
     at: Array
     event: Whole
+    stops: Any
+    circles: Any
+
+
+class Ahead(NamedTuple):
+    """What ends some stretches: the share of each, infinite if nothing does, the time, and what members are after it.
+
+    ``zero_at_end`` is whether each quantity is zero where a stretch ends without that.
+    """
+
+    share: Array
+    t: Array
+    after: After
+    zero_at_end: Any
 
 
 class Arrived(NamedTuple):
@@ -88,7 +108,6 @@ class Arrived(NamedTuple):
         v: velocities, shape (*block, n).
         y: coordinates.
         at: for each event the side from which members came that are still at it.
-        stops: which members a terminal event stopped.
         rests: for members at rest the number of the event that holds them or changes their state again and again, else −1.
         t: the time at which members stopped or came to rest, NaN for others.
     """
@@ -96,7 +115,6 @@ class Arrived(NamedTuple):
     v: Array
     y: Array
     at: Array
-    stops: Any
     rests: Whole
     t: Array
 
@@ -109,12 +127,18 @@ class Resets:
         #: The direction of time.
         self._run, self._way = run, 1.0 if run.plan.dt > 0.0 else -1.0
         self._new_states = {
-            e: NewState(event, run.plan.system, parameters) for e, event in enumerate(run.events) if event.then is not None
+            e: NewState(event, run.plan.system, parameters, by_core=run.plan.backend == "rust")
+            for e, event in enumerate(run.events)
+            if event.then is not None
         }
         #: For each event the side from which members came that are at it since it changed their state in the last step.
         self.at = np.zeros((len(run.events), run.plan.members))
-        #: Which members at an event it leads back to where they are.
-        self.led_back = np.zeros(self.at.shape, dtype=bool)
+        #: Which members at an event it leads back to where they are; which of them have been there for a step or more, with g at
+        #: zero; and whose events set each other off without end, with these.
+        self.led_back, self.lain, self.circles = (np.zeros(self.at.shape, dtype=bool) for _ in range(3))
+
+        #: Since when the states of members were changed as often as they may be; NaN for others.
+        self.often_since = np.full(run.plan.members, np.nan)
 
     def begin(self, t: Array, h: Array, v: Array, y: Array) -> None:
         """Treat members that begin at an event with a direction as if it had changed their state: a ball lies on the ground.
@@ -140,41 +164,131 @@ class Resets:
                     side = np.where(side == 0.0, -np.sign(run.slope(e, who, t[who], h[who], *after)), side)
                 self.led_back[e, who] = self._leads_back(e, t[who], h[who], before, after, who, side)
                 self.at[e, who] = np.where(self.led_back[e, who], side, self.at[e, who])
+            self.lain[e] &= ~changed[e]
 
     def changes(self, e: int) -> bool:
         """Whether an event changes the state."""
         return e in self._new_states
 
-    def new_states(
-        self, t: Array, h: Array, v: Array, y: Array, member: Whole, side: Array, size: Array
-    ) -> tuple[Array, Array, Array, Whole]:
-        """The states from which members go on, the sides from which they came to events where they still are, the last events.
+    def within(self, e: int, steps: Changes) -> tuple[Changes, Whole]:
+        """As ``Collected.within`` for whole steps, where members may lie at the event; also the steps in which it holds them."""
+        lies = self.lain[e, steps.member] & (steps.g == 0.0)
+        return self.from_side(e, steps, np.where(lies, self.at[e, steps.member], 0.0), lies)
+
+    def from_side(self, e: int, steps: Changes, side: Array, lies: Any) -> tuple[Changes, Whole]:
+        """The same from the sides from which members came that are at the event, 0 for others, and which of these lie there."""
+        if not side.any():
+            return self._run.within(e, steps)[0], np.zeros(0, dtype=np.int64)
+        changes, stuck = self._run.within(e, steps, side)
+        who = np.flatnonzero(lies & (side != 0.0))
+        state = steps.v[..., who], steps.y[..., who]
+        holds = self._leads_back(e, steps.t[who], steps.h[who], state, state, steps.member[who], side[who])
+        return changes, np.union1d(stuck, who[holds])
+
+    def leave(self, member: Whole, t: Array, v: Array, y: Array) -> None:
+        """Forget from which side members came that lay at an event and have left it."""
+        for e in self._new_states:
+            who = np.flatnonzero(self.lain[e, member])
+            if len(who):
+                g = self._run.quantity(e, t[who], v[..., who], y[..., who], self._run.members.numbers(member[who]))
+                gone = member[who[g != 0.0]]
+                self.at[e, gone], self.lain[e, gone] = 0.0, False
+
+    def fresh(self, member: Any) -> Any:
+        """Which of these members begin where an event changed their state, or holds them."""
+        return ((self.at[:, member] != 0.0) & ~(self.lain[:, member] & ~self.led_back[:, member])).any(axis=0)
+
+    def holds(self, rests: Whole, member: Whole, t: Array, h: Array, v: Array, y: Array) -> Any:
+        """Which members at rest at these events would be so at these times."""
+        holds = rests >= 0
+        for e in self._new_states:
+            who = np.flatnonzero((rests == e) & self.led_back[e, member])
+            if len(who):
+                state = v[..., who], y[..., who]
+                holds[who] = self._leads_back(e, t[who], h[who], state, state, member[who], self.at[e, member[who]])
+        return holds
+
+    def let_go(self, rests: Whole, member: Whole, t: Array, within: Array, h: Array, v: Array, y: Array) -> Array:
+        """After which share of a time the events let members at rest go; infinite where they do not by its end."""
+        share = np.full(len(member), np.inf)
+        which = np.flatnonzero((rests >= 0) & ~self.holds(rests, member, t + within, h, v, y))
+
+        def trial(some: Any, part: Array) -> tuple[Array, Array, Array]:
+            of = which[some]
+            there = rests[of], member[of], t[of] + part * within[of], h[of], v[..., of], y[..., of]
+            return np.where(self.holds(*there), -1.0, 1.0), *there[-2:]
+
+        ones = np.ones(len(which))
+        share[which] = located(trial, 0.0 * ones, ones, -ones, ones, v[..., which], y[..., which])[0]
+        return share
+
+    def happen(self, at: Located, h: Array, side: Array, due: Any, size: Array, lies: Array) -> After:
+        """What occurs at an instant of some members: events that are due, in the order of the list, and those that they set off.
+
+        A change of the state sets off each event whose quantity it takes across zero or to zero, in the event's direction. An
+        event that changed the state and at which the new state still is begins without a side: it is not set off.
 
         Args:
-            t: the times of the events.
+            at: the members, and where they are.
             h: the lengths of their steps.
-            v: their velocities then, shape (*block, n).
-            y: their coordinates.
-            member: the members.
-            side: for each event the sign of g before it if it changes the state of a member, else 0.
+            side: for each event the sign of its quantity just before.
+            due: which events occur.
             size: for each event the largest |g| at the ends of the step.
-
-        Returns:
-            v, y, for each event its ``side`` if the new state is at the event, else 0, and the number of the last event.
+            lies: for each event the side from which members came that are at it since it changed their state, or 0.
         """
-        run, before, at, event = self._run, (v, y), np.zeros_like(side), np.full(len(member), -1)
-        v, y = v.copy(), y.copy()
-        acting = [(e, who) for e in self._new_states if len(who := np.flatnonzero(side[e]))]
-        for e, who in acting:
-            state = v[..., who], y[..., who]
-            v[..., who], y[..., who] = self._new_states[e](run.sign * t[who], *state, run.members.numbers(member[who]))
-            event[who] = e
-        for e, who in acting:
-            numbers, old, new = run.members.numbers(member[who]), *((a[..., who], b[..., who]) for a, b in (before, (v, y)))
-            there, now = (np.abs(run.quantity(e, t[who], *state, numbers)) for state in (old, new))
-            at[e, who] = np.where(now <= np.maximum(AT * there, LEAST_LEFT * size[e, who]), side[e, who], 0.0)
-            self.led_back[e, member[who]] = self._leads_back(e, t[who], h[who], old, new, member[who], at[e, who])
-        return v, y, at, event
+        run, n, member, numbers = self._run, len(at.member), at.member, self._run.members.numbers(at.member)
+        events, v, y, side, due = range(len(run.events)), at.v.copy(), at.y.copy(), side.copy(), due.copy()
+        stops, event, came, acted = np.zeros(n, dtype=bool), np.full(n, -1), np.zeros_like(side), np.zeros_like(due)
+        g = np.array([run.quantity(e, at.t, v, y, numbers) for e in events])
+        lies, held = np.where(due, 0.0, lies), np.where(self.led_back[:, member], g, 0.0)
+        lies = np.where((g == 0.0) | (held != 0.0), lies, 0.0)
+        side = np.where(lies != 0.0, lies, side)
+        near = np.maximum(np.where(due, AT * np.abs(g), 0.0), LEAST_LEFT * size)
+        near[[e for e, _ in run.timed]] = -1.0  # members are at no event that comes by the time
+        for _ in range(MOST_AT_ONCE):
+            acted[:, due.any(axis=0)] = False
+            for e in events:
+                who = np.flatnonzero(due[e])
+                if not len(who):
+                    continue
+                due[e, who], acted[e, who] = False, True
+                ends = run.ends(e, member[who])
+                self._note(e, at.some(who)._replace(v=v[..., who], y=y[..., who]))
+                if e not in self._new_states:
+                    side[e, who] = np.sign(g[e, who])
+                    stops[who] |= ends
+                    continue
+                who = who[~stops[who]]
+                t, state, of_them = at.t[who], (v[..., who], y[..., who]), run.members.numbers(member[who])
+                v[..., who], y[..., who] = self._new_states[e](run.sign * t, *state, of_them)
+                event[who], came[e, who] = e, side[e, who]
+                for other in events:
+                    last, now = g[other, who], run.quantity(other, t, v[..., who], y[..., who], of_them)
+                    new_side = np.where(now == 0.0, side[other, who], np.sign(now))
+                    if other == e:
+                        new_side = np.where(np.abs(now) <= near[e, who], 0.0, new_side)
+                    else:
+                        crosses = (side[other, who] * now < 0.0) | ((now == 0.0) & (last != 0.0) & (side[other, who] != 0.0))
+                        crosses &= side[other, who] * run.events[other].direction <= 0.0
+                        due[other, who] |= crosses
+                        new_side = np.where(due[other, who], side[other, who], new_side)
+                    g[other, who], side[other, who] = now, new_side
+            if not due.any():
+                break
+        here = np.where(came == 0.0, np.where(g == held, lies, 0.0), np.where(np.abs(g) <= near, came, 0.0))
+        self.lain[:, member] = (here != 0.0) & (came == 0.0) & (g == 0.0)
+        for e in self._new_states:
+            who = np.flatnonzero(came[e])
+            if len(who):
+                old, new = ((each_v[..., who], each_y[..., who]) for each_v, each_y in ((at.v, at.y), (v, y)))
+                self.led_back[e, member[who]] = self._leads_back(e, at.t[who], h[who], old, new, member[who], here[e, who])
+        circles = due.any(axis=0) & ~stops
+        self.circles[:, member[circles]], self.led_back[:, member[circles]] = acted[:, circles], False
+        return After(v, y, here, event, stops, circles)
+
+    def _note(self, e: int, entries: Located) -> None:
+        """Note these occurrences, but for members at rest, which do not cross the event."""
+        self._run.note(e, entries.some(entries.share > AT_START))
 
     def _leads_back(self, e: int, t: Array, h: Array, old: State, new: State, member: Whole, side: Array) -> Any:
         """Whether an event holds members where they are, such as the event of an empty tank that sets a level below zero to zero.
@@ -202,14 +316,15 @@ class Resets:
         """Make one step of some members again, with its events."""
         n, end, step, way = len(stretch.member), stretch.t + stretch.h, np.abs(stretch.h), self._way
         v, y, at = stretch.v_end.copy(), stretch.y_end.copy(), np.zeros_like(stretch.at)
-        times, stops, rests, live = np.full(n, np.nan), np.zeros(n, dtype=bool), np.full(n, -1), np.arange(n)
+        times, rests, live = np.full(n, np.nan), np.full(n, -1), np.arange(n)
         flight, ratio = np.full(n, np.nan), np.full(n, np.nan)
         for resets in range(MOST_IN_A_STEP + 1):
             ahead, returns = self._ahead(stretch, step[live])
+            after, ends = ahead.after, ahead.share < np.inf
             with np.errstate(all="ignore"):
                 last, flight = (
                     flight,
-                    np.where(((stretch.at != 0.0) & (ahead.at != 0.0)).any(axis=0), ahead.t - stretch.t, np.nan),
+                    np.where(((stretch.at != 0.0) & (after.at != 0.0)).any(axis=0), ahead.t - stretch.t, np.nan),
                 )
                 before, ratio = ratio, flight / last
                 rest_of_series = ratio / (1.0 - ratio)
@@ -221,54 +336,89 @@ class Resets:
                     & (returns < 0)
                 )
             if settled.any():
-                which = settled & (ahead.share < np.inf) & ~ahead.stops
-                returns = np.where(which, ahead.event, returns)
+                which = settled & ends & ~after.stops & ~after.circles
+                returns = np.where(which, after.event, returns)
                 v_limit, y_limit = (
                     np.where(which, now + (now - earlier) * rest_of_series, earlier)
-                    for now, earlier in ((ahead.v, stretch.v), (ahead.y, stretch.y))
+                    for now, earlier in ((after.v, stretch.v), (after.y, stretch.y))
                 )
                 stretch = stretch._replace(t=np.where(which, limit, stretch.t), v=v_limit, y=y_limit)
             if resets == MOST_IN_A_STEP:
-                returns = np.where((ahead.share < np.inf) & ~ahead.stops, ahead.event, returns)
-            rest, stop = returns >= 0, (returns < 0) & ahead.stops
-            goes_on, arrives = (returns < 0) & (ahead.share < np.inf) & ~stop, (returns < 0) & ~(ahead.share < np.inf)
+                often = ends & ~after.stops & ~after.circles & (returns < 0)
+                returns = np.where(often, after.event, returns)
+                self.often_since[stretch.member[often]] = (end - way * step)[live[often]]
+            free = self._free(stretch, returns, step[live], ahead, may=resets < MOST_IN_A_STEP)
+            flight, ratio = np.where(free, np.nan, flight), np.where(free, np.nan, ratio)
+            rest, stop = (returns >= 0) & ~free, (returns < 0) & (after.stops | after.circles)
+            goes_on, arrives = ((returns < 0) & ends & ~stop) | free, (returns < 0) & ~ends
             for which, t, state in (
                 (rest, stretch.t, (stretch.v, stretch.y)),
-                (stop, ahead.t, (ahead.v, ahead.y)),
+                (stop, ahead.t, (after.v, after.y)),
                 (arrives, np.full(len(live), np.nan), (stretch.v_end, stretch.y_end)),
             ):
                 who = live[which]
                 times[who], v[..., who], y[..., who] = t[which], state[0][..., which], state[1][..., which]
-            rests[live[rest]], stops[live[stop]] = returns[rest], True
+            rests[live[rest]], rests[live[after.circles]] = returns[rest], after.event[after.circles]
             at[:, live[rest]] = stretch.at[:, rest]
             soon = np.abs(stretch.h) < LEAST_LEFT * step[live]
             at[:, live[arrives & soon]] = stretch.at[:, arrives & soon]
+            lies, far = (stretch.at != 0.0) & ahead.zero_at_end, arrives & ~soon
+            at[:, live[far]], self.lain[:, stretch.member[far]] = np.where(lies, stretch.at, 0.0)[:, far], lies[:, far]
             if not goes_on.any():
                 break
             live, flight, ratio = live[goes_on], flight[goes_on], ratio[goes_on]
             stretch = self._anew(stretch.member[goes_on], stretch.step[goes_on], end[live], ahead, goes_on)
-        return Arrived(v, y, at, stops, rests, times)
+        return Arrived(v, y, at, rests, times)
+
+    def _free(self, stretch: Stretch, returns: Whole, step: Array, ahead: Ahead, *, may: bool) -> Any:
+        """Which members an event that holds them lets go within their stretches. They go on from there, in the same state."""
+        free, who = np.zeros(len(returns), dtype=bool), np.flatnonzero((returns >= 0) & may)
+        if not len(who):
+            return free
+        some, events, h = stretch.some(who), returns[who], self._way * step[who]
+        self.at[:, some.member] = some.at
+        lies = ~self.led_back[events, some.member] & self.lain[events, some.member]
+        self.led_back[events, some.member] |= lies  # where the motion across begins within the stretch
+        share = self.let_go(events, some.member, some.t, some.h, h, some.v, some.y)
+        self.led_back[events[lies], some.member[lies]] = np.isinf(share[lies])
+        share[lies] = np.inf
+        gone = share < np.inf
+        free[who], go = gone, who[gone]
+        self.led_back[events[gone], some.member[gone]] = self.lain[events[gone], some.member[gone]] = False
+        ahead.t[go], ahead.after.at[:, go] = some.t[gone] + share[gone] * some.h[gone], some.at[:, gone]
+        ahead.after.v[..., go], ahead.after.y[..., go] = some.v[..., gone], some.y[..., gone]
+        return free
 
     def _anew(self, member: Whole, step: Whole, end: Array, ahead: Ahead, which: Any) -> Stretch:
         """The rest of the steps, from the new states on."""
-        t, v, y = ahead.t[which], ahead.v[..., which], ahead.y[..., which]
+        t, v, y = ahead.t[which], ahead.after.v[..., which], ahead.after.y[..., which]
         h = self._way * np.maximum(self._way * (end - t), 0.0)
         # Where nothing is left of a step, Verlet would divide by its length.
         v_end, y_end = (np.where(h == 0.0, *each) for each in zip((v, y), self._run.trials.step(member, t, h, v, y), strict=True))
-        return Stretch(member, step, t, h, v, y, v_end, y_end, ahead.at[:, which])
+        return Stretch(member, step, t, h, v, y, v_end, y_end, ahead.after.at[:, which])
 
     def _ahead(self, stretch: Stretch, step: Array) -> tuple[Ahead, Whole]:
         """Note what happens up to the first end of each stretch. Returns the ends, and the event that holds a member, else −1."""
         run, n = self._run, len(stretch.member)
         share, returns, rows = np.full(n, np.inf), np.full(n, -1), np.arange(n)
-        numbers, located, sizes = run.members.numbers(stretch.member), [], []
+        numbers, found, sizes, zero_at_end = run.members.numbers(stretch.member), [], [], []
         ones, zeros = np.ones(n), np.zeros(n)
+        t0 = np.broadcast_to(run.plan.t0, run.plan.batch).reshape(-1)[stretch.member]
+        step_end = t0 + (stretch.step + 1) * run.plan.dt
         for e, quantity in enumerate(run.quantities):
             g = quantity(stretch.t, stretch.v, stretch.y, numbers)
             g_end = quantity(stretch.t + stretch.h, stretch.v_end, stretch.y_end, numbers)
-            head = zeros.astype(np.int64), rows, stretch.member, stretch.step, stretch.t, stretch.h
+            head = zeros.astype(np.int64), rows, stretch.member, stretch.step, stretch.t, stretch.h, step_end
             whole = Changes(*head, zeros, ones, g, g_end, stretch.v, stretch.y, stretch.v_end, stretch.y_end)
             looked = np.flatnonzero(~((stretch.at[e] != 0.0) & (np.abs(stretch.h) < LEAST_LEFT * step)))
+            if e in self._new_states:
+                lain = self.lain[e, stretch.member]
+                stretch.at[e] = np.where(lain & (g != 0.0), 0.0, stretch.at[e])
+                lies = np.flatnonzero(lain & (stretch.at[e] != 0.0))
+                if len(lies):
+                    some = stretch.some(lies)
+                    state, h = (some.v, some.y), self._way * step[lies]
+                    self.led_back[e, some.member] |= self._leads_back(e, some.t, h, state, state, some.member, some.at[e])
             changes, stuck = run.within(e, whole.some(looked), stretch.at[e, looked])
             if e in self._new_states:
                 returns[looked[stuck]] = e
@@ -279,32 +429,59 @@ class Resets:
                     self._way * (occurs.t - stretch.t[changes.place]) <= NO_TIME * step[changes.place]
                 )
                 returns[changes.place[again]] = e
-            located.append((occurs, changes.place, np.sign(changes.g)))
+            found.append((occurs, changes))
             sizes.append(np.maximum(np.abs(g), np.abs(g_end)))
+            zero_at_end.append(g_end == 0.0)
             ends = run.ends(e, occurs.member)
             np.minimum.at(share, changes.place[ends], occurs.share[ends])
-        share[returns >= 0] = -np.inf  # nothing happens before
-        stops, t, v, y = np.zeros(n, dtype=bool), stretch.t.copy(), stretch.v.copy(), stretch.y.copy()
-        for e, (occurs, place, _) in enumerate(located):
-            here = run.ends(e, occurs.member) & (occurs.share == share[place])
-            t[place[here]], v[..., place[here]], y[..., place[here]] = occurs.t[here], occurs.v[..., here], occurs.y[..., here]
-            stops[place[here]] |= e not in self._new_states
-        side = np.zeros_like(stretch.at)
-        for e, (occurs, place, before) in enumerate(located):
-            run.note(e, occurs.some(occurs.share <= share[place]))
-            if e in self._new_states:
-                here = (occurs.share == share[place]) & ~stops[place]
-                side[e, place[here]] = before[here]
-        v, y, at, event = self.new_states(t, self._way * step, v, y, stretch.member, side, np.array(sizes))
+        wakes = self._wakes(stretch, returns, step, share, found)
+        returns[wakes], share[returns >= 0] = -1, -np.inf  # nothing happens before
+        t, v, y = stretch.t.copy(), stretch.v.copy(), stretch.y.copy()
+        for e, (occurs, changes) in enumerate(found):
+            here = occurs.share == share[changes.place]
+            place = changes.place[here]
+            t[place], v[..., place], y[..., place] = occurs.t[here], occurs.v[..., here], occurs.y[..., here]
+            run.note(e, occurs.some(occurs.share < share[changes.place]))
+        v[..., wakes], y[..., wakes] = stretch.v[..., wakes], stretch.y[..., wakes]
+        at = Located(stretch.member, stretch.step, share, t, v, y)
+        after = self.happen(at, self._way * step, *run.sides_before(found, at), np.array(sizes), stretch.at)
         share[returns >= 0] = np.inf
-        return Ahead(share, stops, t, v, y, at, event), returns
+        return Ahead(share, t, after, np.array(zero_at_end)), returns
+
+    def _wakes(self, stretch: Stretch, returns: Whole, step: Array, share: Array, found: list[tuple[Located, Changes]]) -> Any:
+        """Which members that are held meet an event at a known time: they stay until then. Nothing else happens to them."""
+        first, when = np.full(len(returns), np.inf), np.full(len(returns), np.nan)
+        for e, _ in self._run.timed:
+            occurs, changes = found[e]
+            held = (returns >= 0) & self.led_back[returns, stretch.member]
+            here = np.flatnonzero(held[changes.place])[::-1]  # so that the first of each stays
+            here = here[occurs.share[here] <= first[changes.place[here]]]
+            first[changes.place[here]], when[changes.place[here]] = occurs.share[here], occurs.t[here]
+        wakes = np.flatnonzero(first < np.inf)
+        some, h = stretch.some(wakes), self._way * step[wakes]
+        self.at[:, some.member] = some.at
+        gone = self.let_go(returns[wakes], some.member, some.t, when[wakes] - some.t, h, some.v, some.y) < np.inf
+        wakes = wakes[~gone]
+        share[wakes] = first[wakes]
+        timed = {e for e, _ in self._run.timed}
+        for e, (occurs, changes) in enumerate(found):
+            stays = ~np.isin(changes.place, wakes) | (e in timed)
+            found[e] = occurs.some(stays), changes.some(stays)
+        return wakes
 
     def of_rest(self, rests: Whole, times: Array) -> Finding:
         """A finding of members at rest: each one's event by its number, −1 for others, and since when."""
         batch, is_at_rest = self._run.plan.batch, (rests >= 0).reshape(self._run.plan.batch)
         first = int(np.argmin(np.where(rests >= 0, self._way * times, np.inf)))
         some, place = int(is_at_rest.sum()), tuple(int(i) for i in np.unravel_index(first, batch)) if batch else ()
-        if self.led_back[rests[first], first]:
+        if self.circles[:, first].any():
+            names = ", ".join(each.name for each, acts in zip(self._run.events, self.circles[:, first], strict=True) if acts)
+            why = f"events {names} set each other off at this instant, again and again"
+        elif not np.isnan(self.often_since[first]):
+            why = (
+                f"its state was changed more than {MOST_IN_A_STEP} times since t = {self._run.sign * self.often_since[first]:.9g}"
+            )
+        elif self.led_back[rests[first], first]:
             why = "its change of the state leads back onto it, and the motion across it, so that it does not go on"
         else:
             why = "changes of its state follow each other within no time, so that it does not go on by them"

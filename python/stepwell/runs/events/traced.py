@@ -15,18 +15,32 @@ from ...base import checks
 from ...base.arrays import Array
 from ...errors import ArgumentError, TraceError, UnsupportedError
 from ...model.equations.namespace import rebound
+from ...model.equations.recognised import Unknown, identity
 from ...model.equations.trace import kind_of, run_function, scalars
 from ...model.equations.values import Scalar, objects
 from ...model.systems import System
 from ...reference.marks import recording
 from ...reference.tape.modes import directional
-from ...reference.tape.replay import Replay
 from .. import engine
+from .evaluated import Evaluated
 from .event import Event
 
 #: The slope of a quantity without derivative is its change over this share of a step, divided by the share: half of the digits
 #: are roundings.
 SHORT = 2.0**-26
+
+
+#: The operations of quantities, and of those that the core watches, and how many of each are remembered.
+KNOWN: dict[Any, tuple[Evaluated, Evaluated | None, bool]] = {}
+WATCHED: dict[Any, engine.Watched] = {}
+MOST_KNOWN = 256
+
+
+def remember(known: dict[Any, Any], key: Any, value: Any) -> None:
+    """Remember a value, and forget all others if there are too many."""
+    if len(known) >= MOST_KNOWN:
+        known.clear()
+    known[key] = value
 
 
 def parameters_of(function: Any, name: str, system: System, values: dict[str, Any]) -> list[str]:
@@ -59,36 +73,54 @@ class Quantity:
         event: the event.
         system: the system that moves.
         values: the parameters of the system that are numbers, by name, with one batch axis.
+        by_core: whether the core computes it.
     """
 
-    def __init__(self, event: Event, system: System, values: dict[str, Any]) -> None:
+    def __init__(self, event: Event, system: System, values: dict[str, Any], *, by_core: bool) -> None:
+        self._by_core = by_core
         self.event, self.v_shape, self.y_shape = event, system.v_shape, system.y_shape
         self.has_v = prod(system.v_shape) > 0
         self._parameters = parameters_of(event.function, f"events: {event.name}", system, values)
         self._quick_sines = bool(getattr(getattr(system, "definition", None), "quick_sines", False))
         self._shapes = {name: values[name].shape[:-1] for name in self._parameters}
-        traces = [self._operations_of() for _ in range(2)]
-        if traces[0].lines != traces[1].lines:
-            raise TraceError(
-                f"events: {event.name}: expected the same operations at every call, got others: an event may not draw random "
-                f"numbers or count its calls"
-            )
-        self._operations = traces[0]
-        self._slope = self._slope_of()
+        self._n = 1 + self.has_v * prod(self.v_shape) + prod(self.y_shape)
+        #: Equal for quantities with the same operations; None if something that the function reads may change unseen.
+        self.key: Any = None
+        try:
+            of_function = identity(event.function)
+            self.key = (of_function, self.v_shape, self.y_shape, tuple(self._shapes.items()), self._quick_sines, by_core)
+        except Unknown:
+            pass
+        known = KNOWN.get(self.key)
+        if known is None:
+            known = self._trace()
+            if self.key is not None:
+                remember(KNOWN, self.key, known)
+        #: Whether it depends on the time, and on nothing of the state.
+        self._value, self._slope, self.of_time_alone = known
 
-    def _operations_of(self) -> Replay:
-        """The operations of the event; their state begins with the time."""
+    def _trace(self) -> tuple[Evaluated, Evaluated | None, bool]:
+        traces = [self._traced() for _ in range(2)]
+        if traces[0][0].operations(traces[0][1])[0] != traces[1][0].operations(traces[1][1])[0]:
+            raise TraceError(
+                f"events: {self.event.name}: expected the same operations at every call, got others: an event may not draw "
+                f"random numbers or count its calls"
+            )
+        of_state = [extra for name, _, extra in traces[0][0].operations(traces[0][1])[0] if name == "state"]
+        return Evaluated(*traces[0], self._n, by_core=self._by_core), self._slope_of(), of_state == [0]
+
+    def _traced(self) -> tuple[_core.Tape, list[_core.Symbol]]:
+        """The event on a tape; its state begins with the time."""
         tape = _core.Tape()
         numbers, state = map(tape.param, count()), map(tape.state, count())
         t = next(state)
         parameters = {name: _symbols(shape, numbers) for name, shape in self._shapes.items()}
-        return Replay(*tape.operations([self.on(tape, t, state, parameters)]))
+        return tape, [self.on(tape, t, state, parameters)]
 
-    def _slope_of(self) -> Replay | None:
-        """The operations of its derivative along a change of time and state, which follows the state; None if it has pieces."""
+    def _slope_of(self) -> Evaluated | None:
+        """Its derivative along a change of time and state, which follows the state; None if it has pieces."""
         tape = _core.Tape()
-        numbers = map(tape.param, count())
-        n = 1 + self.has_v * prod(self.v_shape) + prod(self.y_shape)
+        numbers, n = map(tape.param, count()), self._n
         state = [tape.state(i) for i in range(n)]
         parameters = {name: _symbols(shape, numbers) for name, shape in self._shapes.items()}
         with recording():
@@ -97,7 +129,7 @@ class Quantity:
                 slope = directional(tape, [value], zip(state, (tape.state(n + i) for i in range(n)), strict=True))
             except UnsupportedError:
                 return None
-        return Replay(*tape.operations(slope))
+        return Evaluated(tape, slope, 2 * n, by_core=self._by_core)
 
     def on(self, tape: _core.Tape, t: _core.Symbol, state: Iterator[_core.Symbol], parameters: dict[str, Any]) -> _core.Symbol:
         """Record the quantity on a tape."""
@@ -110,6 +142,16 @@ class Quantity:
         value = result[()].value if isinstance(result[()], Scalar) else result[()]
         return value if isinstance(value, _core.Symbol) else tape.number(float(value))
 
+    def of_time(self, tape: _core.Tape) -> _core.Symbol:
+        """Record a quantity of the time alone on a tape with a time."""
+        numbers = map(tape.param, count())
+        parameters = {name: _symbols(shape, numbers) for name, shape in self._shapes.items()}
+        return self.on(tape, tape.time(), map(tape.state, count()), parameters)
+
+    def numbers(self, values: dict[str, Any]) -> list[Array]:
+        """The numbers of its parameters, one after the other."""
+        return [each for name in self._parameters for each in _rows(values[name], values[name].shape[:-1])]
+
     def with_parameters(self, tape: _core.Tape, places: dict[str, int]) -> _core.Symbol:
         """Record the quantity as the core computes it, with each parameter from its place on."""
         parameters = {name: _symbols(shape, map(tape.param, count(places[name]))) for name, shape in self._shapes.items()}
@@ -117,7 +159,7 @@ class Quantity:
 
     def __call__(self, t: Array, v: Array, y: Array, values: dict[str, Any]) -> Array:
         """The quantity of states whose first axes are those of a block; times and parameters broadcast over the others."""
-        return self._by(self._operations, self._rows_of(t, v, y), y, values)
+        return self._by(self._value, self._rows_of(t, v, y), y, values)
 
     def slope(self, t: Array, v: Array, y: Array, values: dict[str, Any], h: Array, dv: Array, dy: Array) -> Array:
         """By how much it would change in a step at these rates; from a short step if it has no derivative."""
@@ -132,10 +174,13 @@ class Quantity:
     def _rows_of(self, t: Array, v: Array, y: Array) -> list[Array]:
         return [t, *(_rows(v, self.v_shape) if self.has_v else []), *_rows(y, self.y_shape)]
 
-    def _by(self, operations: Replay, state: list[Array], y: Array, values: dict[str, Any]) -> Array:
-        numbers = [each for name in self._parameters for each in _rows(values[name], values[name].shape[:-1])]
-        with np.errstate(all="ignore"):
-            value = operations(state, numbers)[0]
+    @property
+    def evaluated(self) -> tuple[Evaluated, Evaluated | None]:
+        """The quantity and its derivative along a change of time and state, None without one."""
+        return self._value, self._slope
+
+    def _by(self, evaluated: Evaluated, state: list[Array], y: Array, values: dict[str, Any]) -> Array:
+        value = evaluated(state, self.numbers(values))[0]
         return np.broadcast_to(np.asarray(value, dtype=np.float64), y.shape[len(self.y_shape) :])
 
 
@@ -148,7 +193,7 @@ class NewState:
         values: the parameters of the system that are numbers, by name, with one batch axis.
     """
 
-    def __init__(self, event: Event, system: System, values: dict[str, Any]) -> None:
+    def __init__(self, event: Event, system: System, values: dict[str, Any], *, by_core: bool) -> None:
         self._name, self._function = f"events: {event.name}: then", event.then
         self._shapes = (system.v_shape, system.y_shape) if prod(system.v_shape) > 0 else (system.y_shape,)
         self._parameters = parameters_of(event.then, self._name, system, values)
@@ -159,7 +204,8 @@ class NewState:
         parameters = {name: _symbols(values[name].shape[:-1], numbers) for name in self._parameters}
         blocks = [_symbols(shape, state) for shape in self._shapes]
         result = run_function(rebound(self._function), self._name, quick_sines, Scalar(t), *blocks, **parameters)
-        self._operations = Replay(*tape.operations([each for block in self._blocks(result) for each in symbols(tape, block)]))
+        flat = [each for block in self._blocks(result) for each in symbols(tape, block)]
+        self._evaluated = Evaluated(tape, flat, 1 + sum(map(prod, self._shapes)), by_core=by_core)
 
     def _blocks(self, result: Any) -> list[Any]:
         """The blocks that the function returned, broadcast to their shapes."""
@@ -182,8 +228,7 @@ class NewState:
         blocks = (v, y)[-len(self._shapes) :]
         state = [t, *(row for block, shape in zip(blocks, self._shapes, strict=True) for row in _rows(block, shape))]
         numbers = [each for name in self._parameters for each in _rows(values[name], values[name].shape[:-1])]
-        with np.errstate(all="ignore"):
-            results = self._operations(state, numbers)
+        results = self._evaluated(state, numbers)
         new_v, new_y, n = v.copy(), y.copy(), len(results) - prod(self._shapes[-1])
         for block, shape, rows in ((new_v, self._shapes[0], results[:n]), (new_y, self._shapes[-1], results[n:])):
             for index, row in zip(np.ndindex(*shape), rows, strict=False):
@@ -197,15 +242,21 @@ def symbols(tape: _core.Tape, block: Any) -> list[_core.Symbol]:
     return [each if isinstance(each, _core.Symbol) else tape.number(float(each)) for each in values]
 
 
-def watched(quantities: Sequence[Quantity], plan: engine.Plan) -> engine.Watched:
+def watched(quantities: Sequence[Any], plan: engine.Plan) -> engine.Watched:
     """The quantities as the core computes them for members of this plan."""
     places, rows = {}, 0
     for name, value in plan.system.parameters(plan.batch):
         if isinstance(value, np.ndarray):
             places[name], rows = rows, rows + len(value)
+    key = tuple(each.key for each in quantities), tuple(places.items())
+    if None not in key[0] and key in WATCHED:
+        return WATCHED[key]
     tape = _core.Tape()
-    quantities_by_name = [(each.event.name, each.with_parameters(tape, places)) for each in quantities]
-    return engine.Watched(tape.equations([], [], quantities_by_name), len(quantities_by_name))
+    quantities_by_name = [(str(e), each.with_parameters(tape, places)) for e, each in enumerate(quantities)]
+    made = engine.Watched(tape.equations([], [], quantities_by_name), len(quantities_by_name))
+    if None not in key[0]:
+        remember(WATCHED, key, made)
+    return made
 
 
 def _symbols(shape: tuple[int, ...], symbols: Iterator[Any]) -> Any:

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from itertools import count
+from math import prod
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,16 +17,16 @@ from ...reference import contact, series_pace, tableau
 from ...reference.adaptive import Attempted, longer
 from ...reference.series import expanded
 from ...reference.signal import of_slot, over
-from ...reference.tape.replay import Replay
 from ...reference.traced import Tracer
 from .. import engine
 from ..engine import by_tape
+from .evaluated import Evaluated
 from .members import Members
 
 if TYPE_CHECKING:
     from ...reference.tape.single import Steps
 
-#: A step of an own system with more operations than this is computed by calling its function.
+#: A step of an own system with more operations than this is computed by calling its function where NumPy makes the steps.
 MOST_OPERATIONS = 4000
 #: Steps of up to this many members are made by the core, one after the other: NumPy's calls take as long for one member as for
 #: some hundred.
@@ -32,6 +35,9 @@ MEMBERS_BY_CORE = 6
 LEAST_UNIT = 2.0**-1000
 #: At most this many plans of one member are kept.
 MAX_PLANS = 256
+#: What was traced, by the number of the tapes of the model, and how much of it is kept.
+TRACED: dict[Any, Evaluated] = {}
+MOST_TRACED = 256
 
 
 class Trials:
@@ -45,37 +51,43 @@ class Trials:
         members: its members.
     """
 
+    #: Whether the plan has adaptive steps.
+    _adaptive = False
+
     def __init__(self, plan: engine.Plan, members: Members) -> None:
         self._plan, self._members = plan, members
-        self._operations: Replay | None = None
-        self._numbers: list[Array] = []
+        self._step: tuple[Evaluated, list[Array]] | None = None
         #: Whether the step is replayed from its trace however long it is.
         self._always_traced = False
-        self._is_traced = not isinstance(plan.system, OwnSystem)
         self._by_core = plan.backend == "rust" and not plan.single
+        #: Whether the core makes a step of one member that has no trace.
+        self._steps_one = self._by_core
+        self._is_traced = not self._by_core and not isinstance(plan.system, OwnSystem)
         #: In float32: the parts of a step.
         self._singles: list[Steps] = []
         self._plans: dict[int, engine.Plan] = {}
-        self._rates: tuple[Replay, list[Array]] | None = None
+        self._rates: tuple[Evaluated, list[Array]] | None = None
         self._rates_traced = False
 
     def step(self, index: Any, t: Array, h: Array, v: Array, y: Array) -> tuple[Array, Array]:
         """A step of these members from v and y, with a time and a length for each."""
         if self._plan.single:
             return self._in_single(index, t, h, v, y)
-        if self._by_core and len(index) <= MEMBERS_BY_CORE:
-            return self._one_by_one(index, t, h, v, y)
-        if not self._is_traced:
-            self._trace()
-            self._is_traced = True
-        if self._operations is None:
+        if (traced := self.traced_step()) is None:
+            if self._steps_one and len(index) <= MEMBERS_BY_CORE:
+                return self._one_by_one(index, t, h, v, y)
             return self._one(self._members.plan(index), t, h, v, y)
         state = [t, h, *_rows(v, self._plan.system.v_shape), *_rows(y, self._plan.system.y_shape)]
-        numbers = [each if each.shape[-1] == 1 else each[index] for each in self._numbers]
-        with np.errstate(all="ignore"):
-            rows = self._operations(state, numbers)
+        operations, numbers = traced
+        rows = operations(state, [each if each.shape[-1] == 1 else each[index] for each in numbers])
         n = len(rows) - y[..., 0].size
         return _block(rows[:n], v), _block(rows[n:], y)
+
+    def traced_step(self) -> tuple[Evaluated, list[Array]] | None:
+        """A step as operations, with the values of their parameters, if it is traced."""
+        if not self._is_traced:
+            self._step, self._is_traced = self._traced("step", self._on), True
+        return self._step
 
     def _in_single(self, index: Any, t: Array, h: Array, v: Array, y: Array) -> tuple[Array, Array]:
         """A step of these members in float32."""
@@ -106,38 +118,64 @@ class Trials:
         if self._plan.system.mass_matrix is not None:
             plan, sign = self._members.plan(index), -1.0 if self._plan.backward else 1.0
             return v, sign * h * registry.task("algebraic_rates")(plan.system, y, sign * t, h)  # v has no numbers
-        if not self._rates_traced:
-            self._rates, self._rates_traced = self._traced_rates(), True
-        if self._rates is None:
+        if (traced := self.traced_rates()) is None:
             s = self._scaled(self._members.plan(index), h)
             with np.errstate(all="ignore"):
                 dv, dy = s.dv(t, v, y), s.dy(t, v, y)
             return np.broadcast_to(dv, v.shape), np.broadcast_to(dy, y.shape)
-        operations, numbers = self._rates
+        operations, numbers = traced
         state = [t, h, *_rows(v, self._plan.system.v_shape), *_rows(y, self._plan.system.y_shape)]
-        with np.errstate(all="ignore"):
-            changes = operations(state, [each if each.shape[-1] == 1 else each[index] for each in numbers])
+        changes = operations(state, [each if each.shape[-1] == 1 else each[index] for each in numbers])
         n = len(changes) - y[..., 0].size
         return _block(changes[:n], v), _block(changes[n:], y)
 
-    def _traced_rates(self) -> tuple[Replay, list[Array]] | None:
-        """The rates of an own system as operations, if they are few and have no samples."""
-        plan = self._members.plan(np.arange(self._plan.members))
-        if not isinstance(plan.system, OwnSystem):
+    def traced_rates(self) -> tuple[Evaluated, list[Array]] | None:
+        """The rates as operations, if they are few enough and have no samples."""
+        if not self._rates_traced:
+            self._rates, self._rates_traced = self._trace_rates(), True
+        return self._rates
+
+    def _trace_rates(self) -> tuple[Evaluated, list[Array]] | None:
+        if not self._by_core and not isinstance(self._plan.system, OwnSystem):
             return None
-        tape = _core.Tape()
-        tracer = Tracer(plan.system, tape, plan.force)
-        t, h = tape.state(0), tape.state(1)
-        leaves = (tape.state(i) for i in range(2, 1 << 30))
-        v, y = (_symbols(shape, leaves) for shape in (plan.system.v_shape, plan.system.y_shape))
-        s = self._scaled_symbols(tracer, h)
-        if tracer.tables:
-            return None
-        wide = (np.broadcast_to(s.dv(t, v, y), v.shape), np.broadcast_to(s.dy(t, v, y), y.shape))
-        operations = Replay(*tape.operations(tracer.flat(*wide)))
-        if len(operations.lines) > MOST_OPERATIONS:
-            return None
-        return operations, [np.atleast_1d(each) for each in tracer.numbers]
+
+        def rates(tracer: Tracer, plan: engine.Plan, t: Any, h: Any, v: Any, y: Any) -> tuple[Any, Any]:
+            s = self._scaled_symbols(tracer, h)
+            return np.broadcast_to(s.dv(t, v, y), v.shape), np.broadcast_to(s.dy(t, v, y), y.shape)
+
+        return self._traced("rates", rates)
+
+    def _traced(self, what: str, blocks: Callable[..., tuple[Any, Any]]) -> tuple[Evaluated, list[Array]] | None:
+        """Blocks as operations, with the values of their parameters; None if they have samples, or too many operations.
+
+        What has the same structure has the same operations, which are traced once. A step that the core does not make by one
+        tape, as of many bodies, is not traced at all: that would take seconds.
+        """
+        plan, tape, key = self._members.plan(np.arange(self._plan.members)), _core.Tape(), None
+        if self._by_core:
+            model, choice = engine.model(plan), 0 if self._adaptive else plan.choice
+            if _core.in_parts(model, plan.members, choice=choice, attempts=self._adaptive) is not None:
+                return None
+            key = (_core.tape_number(model, choice=choice, attempts=self._adaptive), what, plan.choice)
+        tracer, sizes = Tracer(plan.system, tape, plan.force), [prod(plan.system.v_shape), prod(plan.system.y_shape)]
+        leaves = map(tape.state, count())
+        t, h = next(leaves), next(leaves)
+        if key in TRACED:
+            self._scaled_symbols(tracer, h)  # which lists the parameters
+            evaluated = TRACED[key]
+        else:
+            v, y = (_symbols(shape, leaves) for shape in (plan.system.v_shape, plan.system.y_shape))
+            values = tracer.flat(*blocks(tracer, plan, t, h, v, y))
+            if tracer.tables:
+                return None
+            evaluated = Evaluated(tape, values, 2 + sum(sizes), by_core=self._by_core)
+            if not (self._by_core or self._always_traced or evaluated.operations <= MOST_OPERATIONS):
+                return None
+            if key is not None:
+                if len(TRACED) >= MOST_TRACED:
+                    TRACED.clear()
+                TRACED[key] = evaluated
+        return evaluated, [np.atleast_1d(each) for each in tracer.numbers]
 
     def _scaled(self, plan: engine.Plan, h: Any) -> Any:
         """The system of these members, scaled to a length for each."""
@@ -162,21 +200,6 @@ class Trials:
             end_v[..., one], end_y[..., one] = out.v[-1], out.y[-1]
         return end_v, end_y
 
-    def _trace(self) -> None:
-        """Trace a step of an own system, if it is short and has no samples."""
-        plan = self._members.plan(np.arange(self._plan.members))
-        tape = _core.Tape()
-        tracer = Tracer(plan.system, tape, plan.force)
-        t, h = tape.state(0), tape.state(1)
-        shapes, leaves = (plan.system.v_shape, plan.system.y_shape), (tape.state(i) for i in range(2, 1 << 30))
-        v, y = (_symbols(shape, leaves) for shape in shapes)
-        blocks = self._on(tracer, plan, t, h, v, y)
-        if tracer.tables:
-            return
-        operations = Replay(*tape.operations(tracer.flat(*blocks)))
-        if len(operations.lines) <= MOST_OPERATIONS or self._always_traced:
-            self._operations, self._numbers = operations, [np.atleast_1d(each) for each in tracer.numbers]
-
     def _one(self, plan: engine.Plan, t: Array, h: Array, v: Array, y: Array) -> tuple[Array, Array]:
         """A step of all members of a plan, with a time and a length for each."""
         return one_step(plan, t, h, v, y)
@@ -190,9 +213,11 @@ class Trials:
 class AdaptiveTrials(Trials):
     """Trials of a plan with adaptive steps, made as saved states within a step are."""
 
+    _adaptive = True
+
     def __init__(self, plan: engine.Plan, members: Members) -> None:
         super().__init__(plan, members)
-        self._by_core = False  # it does not make adaptive steps of a given length
+        self._steps_one = False  # the core does not make adaptive steps of a given length
         self._always_traced = plan.method.has_series
         self._is_traced = self._is_traced and not self._always_traced
 

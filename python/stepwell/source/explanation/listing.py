@@ -320,6 +320,11 @@ def lines_of_program(plan: Plan, attempts: bool) -> tuple[Section, ...]:
                 flight = Formula(f"dy(t, {parts[0].text}, {parts[1].text})")
                 flight = flight if share == 1.0 else formula("multiply", [number(_bits(share)), flight], 0, [None, None])
                 text = formula("add", [parts[1], flight], 0, [None, None])
+            case "square for v" | "square for y":
+                text = Formula(f"square({parts[0].text}, {parts[1].text})")
+            case "if at most":
+                is_at_most = formula("at most", parts[:2], 0, [None, None])
+                text = formula("choose", [is_at_most, *parts[2:]], 0, 3 * [None])
             case "mass":
                 text = parts[0]  # a step with a mass matrix is one tape
             case "scale":

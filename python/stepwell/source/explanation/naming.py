@@ -159,9 +159,10 @@ def states(plan: Plan, attempts: bool, mark: str = "") -> list[str]:
     names = [indexed(name + mark, index) for name, shape in blocks for index in np.ndindex(shape)]
     beside: list[str] = [] if plan.system.control is None else ["work"]
     if attempts:
-        each = ("longest", "relative", "absolute") if plan.acceptance.own else ("longest",)
+        each = ("longest", "noise", "failed", *(("relative", "absolute") if plan.acceptance.own else ()))
         groups = range(engine.groups_of(plan))
         beside = [*adaptive.Pace._fields[: engine.PACE_NUMBERS], *(indexed(name, (group,)) for name in each for group in groups)]
+        beside += [f"low_{name}" for name in names if plan.acceptance.compensated]
     return names + [name + mark for name in beside]
 
 

@@ -37,7 +37,7 @@ PARTS = {
 
 
 #: Names whose meaning begins with them, as several have one.
-MEANINGS = ("fma", "v2", "P", "s", "solve_v", "dv_by_t")
+MEANINGS = ("fma", "v2", "P", "s", "solve_v", "square", "dv_by_t")
 
 
 @dataclass(frozen=True)
@@ -306,6 +306,7 @@ class Explanation(ValueEquality):
             "P": "P, Q: the transition matrix of a step, and what the inputs add at each node",
             "solve_v": f"solve_v, solve_y: x of (I − {self._gamma()}hJ)·x = (a, b), with the derivatives J of the rates at the "
             f"start of the step; a loop that was compiled beforehand eliminates rows",
+            "square": "square(a, b) = the sum of the squares of all numbers of both",
             "dv_by_t": "dv_by_t, dy_by_t: h times the derivatives of h·v̇ and h·ẏ by the time",
             "dv": "h times the rate of v" if self.parts is None else "dv(t, v, y) = h times the rate of v",
         }

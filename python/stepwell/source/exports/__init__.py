@@ -40,6 +40,9 @@ if TYPE_CHECKING:
 
 __all__ = ["ExportedStep", "export"]
 
+#: The name in place of that of a method for the sampled controller alone.
+CONTROLLER = "controller"
+
 LANGUAGES: dict[str, type[Skeleton]] = {"c": C, "csharp": CSharp, "javascript": JavaScript, "python": Python, "rust": Rust}
 
 
@@ -67,7 +70,8 @@ def export(
 
     Args:
         system: the system; one trajectory of it.
-        method: its name, or what ``stepwell.method`` returns.
+        method: its name, or what ``stepwell.method`` returns; ``"controller"`` for the sampled controller alone: a step then
+            reads the state, which the program sets to what it measured, and leaves it as it is.
         language: ``"c"`` (C99), ``"csharp"``, ``"javascript"`` (a module), ``"python"`` (without NumPy) or ``"rust"``.
         dt: the initial value of the step in the file, in units of time; users may change it there, like the parameters.
         t0: the time of step 0, likewise.
@@ -97,7 +101,10 @@ def export(
         >>> sw.export(sw.Oscillator(omega=2.0), "rk4", "c", dt=1 / 60).save("step.c").name
         'step.c'
     """
-    method, system = find_method(method), a_system(system)
+    alone, system = isinstance(method, str) and method == CONTROLLER, a_system(system)
+    if alone and system.controller is None:
+        raise ArgumentError(f"method: expected a sampled controller around the system, to export it alone, got {system!r}")
+    method = find_method("false_euler" if alone else method)
     kind = LANGUAGES[checks.known("language", language, tuple(LANGUAGES))]
     fused, single = checks.flag("fused", fused), checks.is_single(dtype)
     if fused and kind.fma is None:
@@ -106,7 +113,7 @@ def export(
         raise UnsupportedError(
             f"fused: {kind.title} has no fused multiply-add of float32; export without, or to another language"
         )
-    called = prefix(f"{snake(system.kind_name)}_{method.name}" if name is None else name)
+    called = prefix(f"{snake(system.kind_name)}_{CONTROLLER if alone else method.name}" if name is None else name)
     push = None if force is False else 0.0 if force is True else force
     options = Options(v=v, y=y, dt=dt, t0=t0, control=control, force=push, fused=fused, dtype=dtype, start=start)
     request = Request.one_step(system, method, options)
@@ -115,12 +122,12 @@ def export(
         float32.check_written(system, "an exported step")
     if control is not None and v is not None and y is not None:
         warn_of(of_a_strong_control(system, request.v, request.y, plan.dt))
-    traced = Traced(plan, index)
+    traced = Traced(plan, index, alone=alone)
     writer = kind(called, Names(MEMBERS), single)
     written = Written(traced, writer)
     text = writer.file(written, writer.remark(head(written, writer, *_example(request, index))))
     of = "float32" if single else "float64"
-    return ExportedStep(text, called, kind.title, kind.endings, system, method, index, fused, traced.count, of)
+    return ExportedStep(text, called, kind.title, kind.endings, system, None if alone else method, index, fused, traced.count, of)
 
 
 def _member(member: Any, batch: Shape) -> Shape:

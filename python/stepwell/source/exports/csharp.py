@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Sequence
 from typing import Any, ClassVar
 
@@ -154,6 +155,8 @@ static class Example {
         inside = "\n\n".join("\n".join(indented(each.splitlines())) for each in parts)
         state = "\n".join(["/// A state.", f"public sealed class {p}State {{", *indented(self._state(w)), "}"])
         using = ["using System;", "using System.Runtime.InteropServices;"] if self.single else ["using System;"]
+        if re.search(r"(\b\w[\w.\[\]]*) [!=]= \1(?![\w.\[])", inside):
+            using += ["", "#pragma warning disable 1718 // what differs from itself is NaN"]
         about = "/// What a step is described by, and the step."
         return "\n".join([*head, "", *using, "", about, f"public sealed class {p} {{", inside, "}", "", state]) + "\n"
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from math import prod
+
 from ... import _core
 from ...base.arrays import Shape
 from ...base.checks import short
@@ -30,14 +32,19 @@ def head(w: Written, language: Skeleton, v: list[float], y: list[float]) -> list
     evaluations = f"{count} rate evaluation{'s' * (count > 1)} per step"
     blocks = [("v", system.v_shape), ("y", system.y_shape)]
     layout = "; ".join(_layout(name if name == "y" else w.slot, shape) for name, shape in blocks)
-    return [
-        f"{language.prefix}: one step by {method.title}.",
-        "",
-        f"System:  {short(system, MAX_SYSTEM)}",
+    of_method = [
         f"Method:  {method.title} ({method.name}), order {method.order}, {evaluations}",
         f"Stable:  {limit}",
         f"Source:  {method.reference}",
+    ]
+    alone = w.traced.alone
+    return [
+        f"{language.prefix}: {'a sampled controller, without its system' if alone else f'one step by {method.title}'}.",
+        "",
+        f"System:  {short(system, MAX_SYSTEM)}",
+        *(["Before each step set the state to what was measured; the step leaves it as it is."] if alone else of_method),
         f"State:   {layout}",
+        *_outputs(plan),
         "Time:    t0 + k*dt at step k, which the state counts",
         f"Written by stepwell {_core.__version__}. The numbers are those of stepwell.integrate"
         f"{_options(plan.fused, plan.single)}, to the last bit.",
@@ -54,6 +61,16 @@ def _options(fused: bool, single: bool) -> str:
     """The arguments of integrate that decide on the bits."""
     options = [text for text, is_on in (("fused=True", fused), ('dtype="float32"', single)) if is_on]
     return f"(..., {', '.join(options)})" if options else ""
+
+
+def _outputs(plan: engine.Plan) -> list[str]:
+    """Where in the memory what a sampled controller puts out stands after a step."""
+    if plan.system.controller is None:
+        return []
+    first = plan.method.kept_numbers(prod(plan.system.v_shape), prod(plan.system.y_shape))
+    held = plan.system.controller.held_places(plan.system).items()
+    texts = (f"{name} at {', '.join(f'memory[{first + i}]' for i in places)}" for name, places in held)
+    return [f"Set by the controller: {', '.join(texts)}"]
 
 
 def _layout(name: str, shape: Shape) -> str:

@@ -24,7 +24,7 @@ class ExportedStep(ValueEquality):
         language: the language's name.
         endings: the endings that its file may have.
         system: the system, with its control.
-        method: the method.
+        method: the method; None for a sampled controller alone.
         member: which trajectory of the system's batch.
         fused: whether it uses fused multiply-adds.
         operations: the number of operations of a step, including those before the steps.
@@ -43,7 +43,7 @@ class ExportedStep(ValueEquality):
     language: str
     endings: tuple[str, ...]
     system: System
-    method: Method
+    method: Method | None
     member: Shape
     fused: bool
     operations: int
@@ -68,11 +68,12 @@ class ExportedStep(ValueEquality):
     def as_dict(self) -> dict[str, Any]:
         """The attributes as numbers and texts."""
         values = {name: getattr(self, name) for name in self.__dataclass_fields__}
-        return values | {"system": repr(self.system), "method": self.method.name}
+        return values | {"system": repr(self.system), "method": getattr(self.method, "name", None)}
 
     def __str__(self) -> str:
         return self.source
 
     def __repr__(self) -> str:
         single = "" if self.dtype == "float64" else f", {self.dtype}"
-        return f"<{self.name} in {self.language}: {self.method.title}, {self.system!r}, {self.operations} operations{single}>"
+        of = "the controller" if self.method is None else self.method.title
+        return f"<{self.name} in {self.language}: {of}, {self.system!r}, {self.operations} operations{single}>"

@@ -147,6 +147,7 @@ class Traced:
     """A step by a method, for one member of a batch.
 
     Attributes:
+        alone: whether the state stays as it is, and only what a sampled controller remembers is computed.
         operations: the operations of all its functions.
         parts: its functions, by name: "step"; "start" for a method that carries something other than v or keeps blocks between
             steps, and "finish" for one that carries.
@@ -157,8 +158,8 @@ class Traced:
         count: the number of arithmetic operations of a step, including those before the steps.
     """
 
-    def __init__(self, plan: engine.Plan, member: Shape) -> None:
-        self.plan = plan
+    def __init__(self, plan: engine.Plan, member: Shape, *, alone: bool = False) -> None:
+        self.plan, self.alone = plan, alone
         model = engine.model(plan)
         _core.check(model)
         count = about(plan)
@@ -202,6 +203,9 @@ class Traced:
         method, v_shape, y_shape = plan.method, plan.system.v_shape, plan.system.y_shape
         if which == "step":
             symbols = tracer.step(method, plan.choice)
+            if self.alone:
+                n = prod(v_shape) + prod(y_shape)
+                symbols[:n] = map(tape.state, range(n))
         else:
             state = prod(v_shape) + prod(y_shape)
             made = slice(state, state + self.kept) if self.kept else slice(prod(v_shape))

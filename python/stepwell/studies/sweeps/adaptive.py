@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from functools import partial
+from math import prod
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,7 @@ from ...base.arrays import Array
 from ...errors import ArgumentError, ShapeError, UnsupportedError
 from ...model.methods import Method
 from ...model.systems import System
+from ...reference.acceptance import Acceptance
 from ...runs import engine
 from ...runs.adaptive_options import check_times
 from ...runs.diagnostics import may_be_stiff, why_steps_are_short
@@ -164,7 +166,7 @@ def lost(run: Run) -> int:
     """The number of members whose absolute tolerance is so large that the motion is lost in it."""
     if run.controller_state is None:
         return 0
-    groups = len(run.controller_state.pace) - PACE_NUMBERS
+    groups = sum(Acceptance(run.system.groups).counts(prod(run.system.v_shape), prod(run.system.y_shape)))
     return int(np.count_nonzero(lost_in_tolerance(run.controller_state.pace, groups)))
 
 
@@ -202,6 +204,11 @@ class Pieces:
                 rows = np.where(passed, rows, self._waypoints)
             self._waypoints = rows
         return run
+
+    @property
+    def plan(self) -> engine.Plan | None:
+        """The plan of the last piece."""
+        return None if self._last is None else self._last[1].plan
 
     def stiff(self) -> Stiff | None:
         """The members whose steps stability held down, and not the tolerance, or None."""

@@ -11,6 +11,7 @@ import numpy as np
 from ...base import checks
 from ...base.arrays import Array, Shape
 from ...errors import ArgumentError, DTypeError, ShapeError
+from ...model.methods import Method
 
 #: Arguments of ``integrate`` that can be axes. All other names are those of parameters of the system.
 OF_THE_RUN = ("v", "y", "dt", "force", "tolerance")
@@ -152,8 +153,10 @@ def grid(axes: Any) -> Grid:
         ArgumentError: what was given and what was expected.
     """
     if not isinstance(axes, Mapping):
+        order = "; axes stand before the method, sweep(system, axes, method)" if isinstance(axes, (str, Method)) else ""
         raise DTypeError(
-            f"axes: expected a dictionary of arguments by name, such as {{'mu': ('mu', values)}}, got {type(axes).__name__}"
+            "axes: expected a dictionary of arguments by name, such as {'mu': ('mu', values)}, got "
+            f"{type(axes).__name__}{order}"
         )
     if not axes:
         raise ArgumentError("axes: expected at least one, such as {'mu': ('mu', values)}, got none; for one run use integrate")

@@ -21,6 +21,7 @@ from ...model.methods import method as find_method
 from ...model.systems import System
 from ...runs import float32
 from ...runs.findings import is_heard, warn_of
+from ...runs.negative import Negative
 from ...runs.options import machine_of
 from . import adaptive, happenings, lengths
 from .adaptive import Evaluations
@@ -173,9 +174,9 @@ def sweep(
             so large that the motion is lost in it.
         StiffnessWarning: how many members had steps that stability held down, and not the tolerance, which first, with the limit
             there, how much longer steps the tolerance allows, and the method to take.
-        AccuracyWarning: if numbers are finite but meaningless: how many members grew a millionfold by fixed steps beyond the
-            stability limit, and which first; or a pendulum turned so far that its angle has no sine. Encounters of bodies are not
-            searched for here.
+        AccuracyWarning: if numbers are finite but meaningless: how many members ended at a negative amount, which their equations
+            do not reach, or grew a millionfold by fixed steps beyond the stability limit, and which first; or a pendulum turned
+            so far that its angle has no sine. Encounters of bodies are not searched for here.
 
     Example:
         >>> axes = {"omega": ("omega", [1.0, 2.0, 4.0]), "y": ("y0", [0.5, 1.0])}
@@ -393,6 +394,7 @@ class _Tally:
         self.doubts: dict[int, str] = {}
         self.growths: dict[int, Growth] = {}
         self.stiff: dict[int, Stiff] = {}
+        self.amounts: dict[int, Negative] = {}
 
     def add(self, chunk: Chunk, done: Done) -> None:
         status = np.where(np.isin(done.results["status"].values, happenings.EVENTS), 0, done.results["status"].values)
@@ -410,6 +412,8 @@ class _Tally:
             self.growths[chunk.first] = done.growth
         if done.stiff is not None:
             self.stiff[chunk.first] = done.stiff
+        if done.amounts is not None:
+            self.amounts[chunk.first] = done.amounts
 
     def warn(self) -> None:
         if self.bad and self.task.at is not None:
@@ -447,12 +451,14 @@ class _Tally:
                 AccuracyWarning,
                 stacklevel=4,
             )
-        if self.growths:
-            chunk, number = min(self.growths), sum(each.number for each in self.growths.values())
-            grown = self.growths[chunk]
-            warnings.warn(
-                f"{number} of {counted(self.members, 'member')} {grown.size}, {'the first of them' if number > 1 else 'that'} at "
-                f"{self.grid.place(chunk + grown.first[0])}: {grown.why}",
-                AccuracyWarning,
-                stacklevel=4,
-            )
+        grew, ended = "{number} of {members} {size}, {which} at", "{size} in {number} of {members}, {which} at"
+        whose = f"{grew} {{place}}: {{why}}", f"{ended} {{place}}, {{why}}"
+        noticed: tuple[dict[int, Any], ...] = self.growths, self.amounts
+        for text, each in zip(whose, noticed, strict=True):
+            if not each:
+                continue
+            chunk, number = min(each), sum(one.number for one in each.values())
+            first, which = each[chunk], "the first of them" if number > 1 else "that"
+            place, members = self.grid.place(chunk + first.first[0]), counted(self.members, "member")
+            text = text.format(number=number, members=members, size=first.size, which=which, place=place, why=first.why)
+            warnings.warn(text, AccuracyWarning, stacklevel=4)

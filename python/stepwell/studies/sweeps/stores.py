@@ -272,6 +272,15 @@ def opened(path: Path, chunks: Any = None) -> Any:
     return ordered
 
 
+def _where_different(there: Any, wanted: Any) -> tuple[Any, Any]:
+    """Both, or of dictionaries what differs: what is equal would take the place of that."""
+    if not (isinstance(there, dict) and isinstance(wanted, dict)):
+        return there, wanted
+    names = [name for name in {**there, **wanted} if there.get(name) != wanted.get(name)]
+    old, new = ({name: each[name] for name in names if name in each} for each in (there, wanted))
+    return old, new
+
+
 def same_sweep(path: Path, there: dict[str, Any], wanted: dict[str, Any]) -> None:
     """Raise if a store has the results of another sweep."""
     names = [name for name in {**there, **wanted} if there.get(name) != wanted.get(name)]
@@ -279,8 +288,9 @@ def same_sweep(path: Path, there: dict[str, Any], wanted: dict[str, Any]) -> Non
         differences = "; ".join(
             "the equations are others: their first steps have other bits"
             if name == "first steps"
-            else f"{name}: {checks.short(there.get(name), 60)} there, {checks.short(wanted.get(name), 60)} asked for"
+            else f"{name}: {checks.short(old, 60)} there, {checks.short(new, 60)} asked for"
             for name in names
+            for old, new in [_where_different(there.get(name), wanted.get(name))]
             if name != "first steps" or len(names) == 1
         )
         raise ArgumentError(

@@ -25,6 +25,7 @@ from ...runs import engine
 from ...runs.diagnostics import of_a_strong_control
 from ...runs.findings import Finding
 from ...runs.making import quietly, step
+from ...runs.negative import Negative, of_a_run
 from ...runs.options import Options, spread
 from ...runs.request import Request
 from ...runs.result import Run
@@ -158,6 +159,7 @@ class Done(NamedTuple):
         lost: the number of members whose absolute tolerance is so large that the motion is lost in it.
         growth: the members that grew by fixed steps beyond their stability limit, or None.
         stiff: the members whose adaptive steps stability held down, or None.
+        amounts: the members that ended at a negative amount, which no solution reaches, or None.
         why_stopped: why the first member stopped before the last time, or "".
     """
 
@@ -166,6 +168,7 @@ class Done(NamedTuple):
     lost: int = 0
     growth: Growth | None = None
     stiff: Stiff | None = None
+    amounts: Negative | None = None
     why_stopped: str = ""
 
 
@@ -215,20 +218,23 @@ def run(task: Task, values: dict[str, Any], members: int, stopped: Callable[[], 
     about = "first step that was not finite, or −1" if task.at is None else "step at which the member stopped, or −1"
     bad = Variable((), np.array(last.first_bad_step, dtype=np.int64), about)
     parts.append({"status": status, "first_bad_step": bad})
-    grown = _growth_of(task, options, last) if task.at is None else None
+    grown, amounts = _alone(task, options, last, pieces)
     doubt = last.system.doubt(last.y)
     stiff, why = (None, "") if task.at is None else (pieces.stiff(), pieces.why_stopped())
-    return Done(together(parts), None if doubt is None else doubt[0], lost(last), grown, stiff, why)
+    return Done(together(parts), None if doubt is None else doubt[0], lost(last), grown, stiff, amounts, why)
 
 
-def _growth_of(task: Task, options: dict[str, Any], last: Run) -> Growth | None:
-    """The members that grew by their steps alone, from the start of the sweep to the end of the last piece of its run."""
+def _alone(task: Task, options: dict[str, Any], last: Run, pieces: Pieces) -> tuple[Growth | None, Negative | None]:
+    """The members that by their steps alone grew, and that became negative, from the start of the sweep to its end."""
     if any(event.then for event in options.get("events", ())):
-        return None  # events may change states, so growth says nothing about the steps
+        return None, None  # events may change states, so these say nothing about the steps
     system, batch = last.system, last.status.shape
     blocks = (("v", velocities(system, options.get("v")), system.v_shape), ("y", options["y"], system.y_shape))
     v, y = (spread(checks.block(name, block, shape, system.axes), shape, batch) for name, block, shape in blocks)
-    return _growth.of_last_piece(last, (v, y), task.transient + task.steps)
+    if task.at is not None:
+        return None, of_a_run(last, y, pieces.plan)
+    grown = _growth.of_last_piece(last, (v, y), task.transient + task.steps)
+    return grown, of_a_run(last, y) if grown is None else None
 
 
 def _reduced(

@@ -23,7 +23,7 @@ COLUMNS = 2
 #: Samples within this of the exact solution cannot be told from it: half the width of its line.
 SEEN = 0.05
 
-#: The panel of errors is so much wider than the lines, for their names, which are so far apart, as a share of its height.
+#: The panel of errors is so much wider than the lines, for their names, which are so far apart, as a share of a panel's height.
 NAMES, ROOM = 1.6, 0.105
 
 #: Of methods that differ by less in r₁² and in Ψ/Φ the eigenvalues are the same but for rounding.
@@ -48,10 +48,11 @@ def overview(chart: Figures) -> Figure:
     count = len(apart) + bool(exact)
     across = min(COLUMNS, count)
     down = -(-count // across)
-    width, height = 12.5, 2.3 * down + 2.3
+    width, height = 12.5, 2.3 * (down - 1 + _taller(exact)) + 2.3
     with page(width, height) as figure:
         places = {"left": 0.06, "right": 0.985, "bottom": 1.15 / height, "top": 1.0 - 1.55 / height, "wspace": 0.13}
-        panels = figure.subplots(down, across, squeeze=False, gridspec_kw=places | {"hspace": 0.62})
+        heights = [*[1.0] * (down - 1), _taller(exact)]
+        panels = figure.subplots(down, across, squeeze=False, height_ratios=heights, gridspec_kw=places | {"hspace": 0.62})
         for i, axes in enumerate(panels.ravel()):
             if i >= count:
                 axes.set_visible(False)
@@ -66,6 +67,11 @@ def overview(chart: Figures) -> Figure:
         figure.text(0.008, 1.0 - 0.74 / height, _start(chart), size=13, color=GREY)
         figure.text(0.008, 0.14 / height, MARKS[0], size=12, color=GREY)
     return figure
+
+
+def _taller(exact: list[Samples]) -> float:
+    """By how much the panel of errors is higher than others, so that its names have room."""
+    return max(1.0, (len(exact) + 1) * ROOM)
 
 
 def groups(chart: Figures) -> tuple[list[list[Samples]], list[Samples]]:
@@ -139,7 +145,7 @@ def _errors(axes: Axes, exact: list[Samples]) -> None:
     axes.set(yscale="log", xlim=(0.0, NAMES * end))
     axes.minorticks_off()
     axes.locator_params(axis="y", numticks=6)
-    at_ends(axes, ends, 11.0, ROOM)
+    at_ends(axes, ends, 11.0, ROOM / _taller(exact))
     _head(axes, f"{len(exact)} methods that look exact", "the largest |y − cos ω₀t| so far")
     axes.grid(which="major", color="#dddddd", linewidth=0.8)
 

@@ -52,9 +52,8 @@ def draw(chart: StabilityMap) -> Figure:
         scale.set_ticks([0.0, *LEVELS, 1.0])
         scale.set_label("radius r₁: factor of the amplitude in a step", labelpad=8)
         title(figure, 0.012, 0.945, finding(chart), 18)
-        below = (
-            f"{chart.method.section}. Damped oscillator (§3): the largest eigenvalue of a step, over its length and the damping."
-        )
+        below = "Damped oscillator (§3): the largest eigenvalue of a step, over its length and the damping."
+        below = f"{chart.method.section}. {below}" if chart.method.section else below  # an own method has none
         figure.text(0.012, 0.895, below, size=12.5, color=GREY)
         notes = "Thick line: r₁ = 1. Hatched: growing samples. The exact solution decays wherever D > 0."
         figure.text(0.012, 0.025, notes, size=12, color=GREY)

@@ -274,6 +274,8 @@ def stability_map(
 
 def _fitted(method: Method, damping: tuple[float, float] | None) -> float:
     """The end of the map's axis: a little past the largest angle up to which a row is stable from its start."""
+    if damping is None and not method.limit:  # though small angles may grow by less than a rounding
+        return NOWHERE
     columns, rows = COARSE
     angles = np.arange(1, columns + 1) * (FARTHEST / columns)
     ratios = None if damping is None else np.linspace(*damping, rows)[:, np.newaxis]

@@ -19,6 +19,7 @@ else:
 MARKERS: tuple[Any, ...] = (
     *"osD^vPh*<>pdX8H",
     *((4, 1, 0), (6, 1, 0), (3, 1, 0), (8, 1, 0), (3, 1, 180), (4, 1, 45), (3, 1, 90), (3, 1, 270), (5, 1, 180)),
+    *((7, 1, 0), (5, 0, 180), (6, 1, 30), (4, 1, 22), (9, 1, 0)),
 )
 #: A colour for each family of methods, the same in every chart. No two are alike in grey, in print, or to an eye without green
 #: cones: tests/views/test_looks.py measures them.
@@ -123,7 +124,8 @@ def apart(methods: Iterable[Method], method: Method) -> dict[str, Any]:
 
 def family(method: Method) -> str:
     """The one of ``FAMILIES`` to which a method belongs; the default is the Runge-Kutta methods."""
-    known = {"verlet": "leapfrog", "wisdom_holman": "leapfrog", "pefrl": "PEFRL", "dop853": "Dormand-Prince"}
+    known = {"verlet": "leapfrog", "wisdom_holman": "leapfrog", "pefrl": "PEFRL"}
+    known |= dict.fromkeys(("dopri5", "dop853"), "Dormand-Prince")
     last = method.name.rsplit("_", 1)[-1]
     return {"euler": "Euler", "heun": "Heun", "leapfrog": "leapfrog"}.get(last, known.get(method.name, "Runge-Kutta"))
 

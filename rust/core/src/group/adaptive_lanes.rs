@@ -12,6 +12,7 @@ use crate::{
     step::{
         key::StepKind,
         pace::Pace,
+        series_pace::{share_of, sum},
         tapes::{Tapes, Traced},
     },
 };
@@ -22,6 +23,8 @@ pub struct AdaptiveLanes {
     /// Numbers of v and y, and those that stand behind the pace.
     numbers: usize,
     scales: usize,
+    /// Whether the last of these are what rounding left out of each number of the state.
+    compensated: bool,
     step: PreparedStage,
     /// Rows of v, of y, of the paces, of the sizes and, of a series, of its coefficients.
     state: Aligned,
@@ -71,7 +74,8 @@ impl AdaptiveLanes {
         let (numbers, scales) = (traced.shape.v + traced.shape.y, acceptance.numbers(traced.shape.v, traced.shape.y));
         let all = tapes.step.split.body.next.len();
         let state = Aligned::new(all * step.lanes());
-        Ok(AdaptiveLanes { state, step, numbers, scales, by_terms: None, begin: None, level, budget, tapes })
+        let compensated = acceptance.compensated;
+        Ok(AdaptiveLanes { state, step, numbers, scales, compensated, by_terms: None, begin: None, level, budget, tapes })
     }
 }
 
@@ -154,6 +158,22 @@ impl AdaptiveBatch for AdaptiveLanes {
     fn steps_left(&self) -> f64 {
         let lanes = self.step.lanes();
         Pace::steps_left(|i| &self.state[(self.numbers + i) * lanes..][..lanes])
+    }
+
+    fn sum_of_terms(&self, lane: usize, length: f64, state: &mut [f64]) -> bool {
+        if !self.tapes.sums {
+            return false;
+        }
+        let (lanes, n) = (self.step.lanes(), self.numbers);
+        let at = |row: usize| self.state[row * lanes + lane];
+        let first = n + Pace::<f64>::NUMBERS + self.scales;
+        let order = (self.state.len() / lanes - first) / n.max(1);
+        let share = share_of(length, self.pace(lane).before);
+        let low = |i: usize| if self.compensated { at(first - n + i) } else { 0.0 };
+        for (i, number) in state.iter_mut().enumerate() {
+            *number = sum((at(i), low(i)), |k| at(first + k * n + i), order, share);
+        }
+        true
     }
 
     fn attempt_by_terms(&mut self, spec: &Spec, lane: usize, member: usize) {

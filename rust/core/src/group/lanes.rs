@@ -41,6 +41,8 @@ pub struct Lanes<T: Real = f64> {
     shape: Shape,
     /// Numbers of a member that the method keeps behind both slots.
     kept: usize,
+    /// How many of these a sampled controller remembers.
+    memory: usize,
     recorded: usize,
     level: Level,
     clock: Clock,
@@ -84,6 +86,7 @@ impl<T: Traceable> Lanes<T> {
             tapes,
             shape: traced.shape,
             kept: traced.kept,
+            memory: traced.memory,
             recorded: traced.recorded,
         })
     }
@@ -191,10 +194,11 @@ impl<T: Traceable> Group<T> for Lanes<T> {
     }
 
     fn record(&mut self, rows: &mut [T]) {
-        let (v, y) = self.sizes();
+        let ((v, y), memory, end) = (self.sizes(), self.memory * self.lanes(), self.before_tally());
         if let (Some(side), Some(stage)) = (&mut self.record, &self.tapes.record) {
+            side.state[v + y..v + y + memory].copy_from_slice(&self.state[end - memory..end]);
             let made = side.run(stage, &self.clock, 0, &self.state[..v + y]);
-            rows.copy_from_slice(&made[v + y..]);
+            rows.copy_from_slice(&made[v + y + memory..]);
         }
     }
 

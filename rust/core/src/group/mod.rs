@@ -148,6 +148,11 @@ pub trait AdaptiveBatch: Send {
     /// One attempt of one lane, at the start of a step whose coefficients are known.
     fn attempt_by_terms(&mut self, _spec: &Spec, _lane: usize, _member: usize) {}
 
+    /// The state of one lane after a part of a step whose coefficients are known, if it is the sum of the series alone.
+    fn sum_of_terms(&self, _lane: usize, _length: f64, _state: &mut [f64]) -> bool {
+        false
+    }
+
     /// Sets the flag at which an attempt that may take long stops early.
     fn set_stop_flag(&mut self, _stop: &Stop) {}
 }

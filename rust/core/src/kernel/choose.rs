@@ -33,8 +33,10 @@ pub fn choose_long(body: &Body, level: Level, lanes: usize) -> Option<Shape> {
     };
     let fits = level > Level::Baseline && lanes.is_multiple_of(width);
     let vectors = lanes / width;
-    let block_vectors = [4, 2, 1].into_iter().find(|n| vectors.is_multiple_of(*n))?;
-    fits.then_some(Shape { level, bytes, width, block_vectors, interleaved: 1, blocks: vectors / block_vectors, resident: false })
+    let most = (MAX_CODE_OPERATIONS / body.work().max(1)).max(1);
+    let block_vectors = [4, 2, 1].into_iter().find(|n| *n <= most && vectors.is_multiple_of(*n))?;
+    let blocks = vectors / block_vectors;
+    fits.then_some(Shape { level, bytes, width, block_vectors, interleaved: 1, blocks, resident: lanes == 1 })
 }
 
 /// The shape for several steps of this body in one call, over rows of a given number of lanes; None as above. As many vectors are

@@ -8,6 +8,7 @@ mod choose;
 mod frame;
 mod instruction_set;
 pub mod interpret;
+mod local_order;
 mod loops;
 mod machine;
 mod memory;
@@ -29,6 +30,7 @@ pub mod writer {
     pub use super::{
         choose::{choose, choose_long, choose_unrolled},
         frame::Frame,
+        local_order::{in_local_order, packed_in_local_order},
         schedule::{Order, Waits, in_turn},
         shape::Shape,
         written::{Assembled, Written, allowed, assemble, write, write_if_it_gains, write_packed},

@@ -2,10 +2,12 @@
 //!
 //! An [`InstructionSet`] says which instructions there are.
 
-use std::collections::HashMap;
-
 use super::{instruction_set::InstructionSet, scaled::Scaled};
-use crate::tape::{Counts, Id, Op, split::Body};
+use crate::tape::{
+    Counts, Id, Op,
+    fast_hash::{FastHashMap, Places},
+    split::Body,
+};
 
 /// Where a value comes from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -67,7 +69,7 @@ pub(crate) struct KernelPlan<I> {
     /// The value of each number of the state before the step, if it is read.
     pub old: Vec<Option<Id>>,
     /// The bits of the constants, the first numbers of the pool. The uniforms follow.
-    pub constants: Vec<u64>,
+    pub constants: Places<u64>,
     pub per_step: usize,
     /// Where the numbers of one member are lanes of vectors: how.
     pub packing: Option<Packing>,
@@ -89,23 +91,20 @@ pub(crate) struct Packing {
 }
 
 impl<I: Copy> KernelPlan<I> {
-    /// None if it is not a valid body: everything here and in the writer relies on its form.
-    pub(crate) fn new<M: InstructionSet<Instruction = I>>(body: &Body, machine: &M) -> Option<KernelPlan<I>> {
-        if !is_sound(body) {
-            return None;
-        }
+    /// Of a body that [`is_sound`].
+    pub(crate) fn new<M: InstructionSet<Instruction = I>>(body: &Body, machine: &M) -> KernelPlan<I> {
         let mut plan = KernelPlan {
             sources: Vec::with_capacity(body.ops.len() + 1),
             steps: Vec::with_capacity(body.ops.len()),
             next: Vec::new(),
             old: vec![None; body.next.len()],
-            constants: Vec::new(),
+            constants: Places::default(),
             per_step: body.per_step,
             packing: None,
         };
         plan.next = (0..body.next.len()).map(|s| (!body.keeps(s)).then_some(body.next[s])).collect();
         // A leaf that occurs twice is one value.
-        let mut known: HashMap<Source, Id> = HashMap::new();
+        let mut known: FastHashMap<Source, Id> = FastHashMap::default();
         let mut same: Vec<Id> = Vec::with_capacity(body.ops.len());
         for (id, op) in body.ops.iter().enumerate() {
             let source = match *op {
@@ -171,19 +170,15 @@ impl<I: Copy> KernelPlan<I> {
         for source in &mut plan.sources {
             if let Source::Pool(i) = source {
                 let uniforms = body.uniforms as u32;
-                *i = if *i < uniforms { *i + plan.constants.len() as u32 } else { *i - uniforms };
+                *i = if *i < uniforms { *i + plan.constants.list.len() as u32 } else { *i - uniforms };
             }
         }
-        Some(plan)
+        plan
     }
 
     /// A constant of the pool; until it is known how many there are, they are numbered behind the uniforms.
     pub(crate) fn constant(&mut self, bits: u64, uniforms: usize) -> Source {
-        let at = self.constants.iter().position(|known| *known == bits).unwrap_or_else(|| {
-            self.constants.push(bits);
-            self.constants.len() - 1
-        });
-        Source::Pool((uniforms + at) as u32)
+        Source::Pool(uniforms as u32 + self.constants.of(bits))
     }
 }
 

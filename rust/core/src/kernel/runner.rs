@@ -20,7 +20,7 @@ use crate::{
 const INTERPRETATIONS_PER_WRITE: u64 = 4000;
 /// After so many steps of a single member it is tried whether equal operations can be lanes of one vector: that takes about as
 /// long as these steps.
-const STEPS_PER_PACKING: u64 = 30_000;
+const STEPS_PER_PACKING: u64 = 12_000;
 /// The cost of dispatching an operation over a row of lanes in the interpreter, in lanes.
 const LANES_PER_DISPATCH: usize = 10;
 

@@ -23,6 +23,8 @@ const MAX_SHARED: usize = 12;
 const MAX_WAITING_PER_REGISTER: usize = 2;
 /// The same for vectors one after the other of which some wait for roots and quotients, also where there are fewer registers.
 const MAX_WAITING_AROUND_SLOW: usize = 32;
+/// So many results of a single vector may wait if what has the longest way to the end goes first: of a wide step nearly all would.
+const MAX_WAITING_LONGEST: usize = 128;
 /// So many operations an interleaved vector is behind the one before it: sums of some are then made while products of others are,
 /// by other units. Fitted to the fastest numbers on the scenes of the benchmarks; less where steps are so short that it would
 /// leave gaps.
@@ -84,7 +86,8 @@ pub(super) fn order<I: Copy>(plan: &KernelPlan<I>, ops: &[Op], shape: Shape) -> 
     }
     let waiting = waits.waiting(&order);
     let most_waiting = if waiting <= fit { waiting } else { MAX_WAITING_PER_REGISTER * shape.registers() };
-    let order = if is_single { waits.longest_first(order) } else { order };
+    let longest = is_single.then(|| waits.longest_first(order.clone()));
+    let order = longest.filter(|longest| waits.waiting(longest) <= MAX_WAITING_LONGEST).unwrap_or(order);
     waits.shortened(&order, most_waiting)
 }
 

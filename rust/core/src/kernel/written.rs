@@ -3,6 +3,7 @@
 use super::{
     Kernel, Tile, aarch64,
     frame::Frame,
+    local_order::{MAX_WAITING, MAX_WAITING_PACKED, in_local_order, packed_in_local_order},
     loops,
     pack::{self, MOST_LANES, Packed, Verdict},
     pages::Pages,
@@ -67,12 +68,15 @@ fn assemble_for<M: MakeOperation>(body: &Body, shape: Shape) -> Option<Assembled
 }
 
 fn assemble_plan<M: MakeOperation>(body: &Body, packed: Option<&Packed>, shape: Shape) -> Option<Assembled> {
-    if !shape.is_possible(body, M::MOST_OPERATIONS) {
+    // Everything below relies on the form of a body.
+    if !is_sound(body) || !shape.is_possible(body, M::MOST_OPERATIONS) {
         return None;
     }
     let machine = M::new(shape, body.ops.len() * shape.block_vectors);
+    let ordered = packed.is_none().then(|| in_local_order(body, MAX_WAITING));
+    let body = ordered.as_ref().unwrap_or(body);
     let plan = match packed {
-        None => KernelPlan::new(body, &machine)?,
+        None => KernelPlan::new(body, &machine),
         Some(packed) => KernelPlan::packed(body, packed, &machine)?,
     };
     let order = match packed {
@@ -83,12 +87,12 @@ fn assemble_plan<M: MakeOperation>(body: &Body, packed: Option<&Packed>, shape: 
     let (code, spills) = loops::function(&plan, machine, shape, &order)?;
     let (homes, slot) = plan.packing.as_ref().map_or((0, shape.width), |packing| (packing.homes, MOST_LANES));
     let frame = Frame {
-        pool: (plan.constants.len() + body.uniforms) * shape.pool_copies(),
+        pool: (plan.constants.list.len() + body.uniforms) * shape.pool_copies(),
         scratch: ((homes + spills) * slot).next_multiple_of(64 / shape.bytes),
         aligned_pool: shape.pool_copies() > 1,
         ..Frame::new(body, shape.lanes())
     };
-    Some(Assembled { code, frame, shape, spills, packing: None, constants: plan.constants })
+    Some(Assembled { code, frame, shape, spills, packing: None, constants: plan.constants.list })
 }
 
 /// A kernel as machine code of this machine.
@@ -113,7 +117,7 @@ pub fn write_if_it_gains(body: &Body, shape: Shape) -> Option<Written> {
         return None;
     }
     let (verdict, packed) = pack::best(body)?;
-    let packed = packed.filter(|_| verdict.gains())?;
+    let packed = packed_in_local_order(&packed.filter(|_| verdict.gains())?, MAX_WAITING_PACKED);
     let written = write_packed(body, shape.level, &packed)?;
     Some(Written { assembled: Assembled { packing: Some(verdict), ..written.assembled }, ..written })
 }
@@ -122,7 +126,7 @@ pub fn write_if_it_gains(body: &Body, shape: Shape) -> Option<Written> {
 pub fn write_packed(body: &Body, level: Level, packed: &Packed) -> Option<Written> {
     let shape =
         Shape { level, bytes: body.precision.bytes(), width: 1, block_vectors: 1, interleaved: 1, blocks: 1, resident: true };
-    if cfg!(not(target_arch = "x86_64")) || !level.here() || !shape.packs() || !is_sound(body) || !packed.is_sound(body) {
+    if cfg!(not(target_arch = "x86_64")) || !level.here() || !shape.packs() || !packed.is_sound(body) {
         return None;
     }
     execute(assemble_plan::<x86::encode::Code>(body, Some(packed), shape)?)

@@ -86,11 +86,11 @@ impl AdaptiveBatch for LargeAdaptive {
     }
 
     fn scales(&self, _lane: usize) -> Vec<f64> {
-        [&self.scales.longest[..], &self.scales.own[..]].concat()
+        self.scales.numbers()
     }
 
     fn set_scales(&mut self, _lane: usize, numbers: &[f64]) {
-        self.scales = Scales::of(numbers, self.acceptance.own);
+        self.scales = Scales::of(numbers, &self.acceptance, 0); // no series has steps like these
     }
 
     fn set_stop_flag(&mut self, stop: &Stop) {
@@ -115,9 +115,9 @@ impl AdaptiveBatch for LargeAdaptive {
             let blocks: Vec<&[f64]> = schedules.step.results.iter().enumerate().map(|(i, row)| block(i, *row)).collect();
             let made = Made::of(&self.acceptance, [block(0, V), block(1, Y)], &blocks);
             let counts = self.acceptance.counts(sizes[0], sizes[1]);
-            let (next, longest, took) = judge(&self.pace, &self.scales, self.order, counts, &made, outlook);
+            let (next, scales, took) = judge(&self.pace, &self.scales, self.order, counts, &made, outlook);
             self.pace = next;
-            self.scales.longest = longest;
+            self.scales = scales;
             if took {
                 for ((home, made), numbers) in [V, Y].into_iter().zip(&schedules.step.results).zip(*sizes) {
                     arena.copy_within(made * *stride..made * *stride + numbers, home * *stride);

@@ -8,7 +8,7 @@ use super::{
 };
 use crate::{
     isa::Level,
-    model::spec::Spec,
+    model::{program::square, spec::Spec},
     stage::{Clock, PreparedStage, Stop},
 };
 
@@ -95,6 +95,14 @@ impl Executor {
                         Rate::SolutionY => out_row[..sizes[1]].copy_from_slice(rates.solution()[1]),
                         Rate::ByTimeV => out_row[..sizes[0]].copy_from_slice(rates.by_time()[0]),
                         Rate::ByTimeY => out_row[..sizes[1]].copy_from_slice(rates.by_time()[1]),
+                        Rate::SquareV | Rate::SquareY => {
+                            let (numbers, lanes) = (sizes[usize::from(*rate == Rate::SquareY)], rates.lanes());
+                            for lane in 0..lanes {
+                                let of = |block, size| row(block, size).iter().skip(lane).step_by(lanes);
+                                let sum = square(of(*v, sizes[0]).chain(of(*y, sizes[1])));
+                                out_row[..numbers].iter_mut().skip(lane).step_by(lanes).for_each(|out| *out = sum);
+                            }
+                        }
                     }
                 }
                 (Action::Both { at, state: [v, y], out: [dv, dy] }, _) => {

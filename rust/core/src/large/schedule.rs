@@ -44,6 +44,10 @@ pub enum Rate {
     ByTimeV,
     /// Likewise of y.
     ByTimeY,
+    /// The sum of the squares of both blocks, at each place of a block of v.
+    SquareV,
+    /// Likewise of y.
+    SquareY,
 }
 
 /// One action of a schedule.
@@ -105,6 +109,8 @@ enum Node {
     Add(usize, usize),
     Sub(usize, usize),
     Scale(f64, usize),
+    /// The third where the first is at most the second, else the fourth.
+    IfAtMost([usize; 4]),
     /// The step times it.
     TimesStep(usize),
     /// It divided by the step.
@@ -116,9 +122,10 @@ enum Node {
 impl Node {
     fn operands(self) -> impl Iterator<Item = usize> {
         let (list, n) = match self {
-            Node::Start(_) => ([0; 2], 0),
-            Node::Scale(_, a) | Node::TimesStep(a) | Node::PerStep(a) | Node::Stretched(a) => ([a, 0], 1),
-            Node::Ask(_, _, a, b) | Node::Add(a, b) | Node::Sub(a, b) => ([a, b], 2),
+            Node::Start(_) => ([0; 4], 0),
+            Node::Scale(_, a) | Node::TimesStep(a) | Node::PerStep(a) | Node::Stretched(a) => ([a, 0, 0, 0], 1),
+            Node::Ask(_, _, a, b) | Node::Add(a, b) | Node::Sub(a, b) => ([a, b, 0, 0], 2),
+            Node::IfAtMost(all) => (all, 4),
         };
         list.into_iter().take(n)
     }
@@ -199,6 +206,9 @@ impl PassPlan {
                 Entry::ImplicitY(_, v, y) => (Node::Ask(Rate::SolutionY, Time::START, of(v), of(y)), false),
                 Entry::ByTimeV => (Node::Ask(Rate::ByTimeV, Time::START, V, Y), true),
                 Entry::ByTimeY => (Node::Ask(Rate::ByTimeY, Time::START, V, Y), false),
+                Entry::SquareV(v, y) => (Node::Ask(Rate::SquareV, Time::START, of(v), of(y)), true),
+                Entry::SquareY(v, y) => (Node::Ask(Rate::SquareY, Time::START, of(v), of(y)), false),
+                Entry::IfAtMost(all) => (Node::IfAtMost(all.map(of)), made[all[0].index()].1),
                 // A step with a mass matrix is one tape (`tapes.rs`), so this is the matrix of units.
                 Entry::Mass(a) => {
                     made.push(made[a.index()]);
@@ -401,6 +411,7 @@ impl PassPlan {
                 Node::Add(a, b) => Op::Add(of(a), of(b)),
                 Node::Sub(a, b) => Op::Sub(of(a), of(b)),
                 Node::Scale(c, a) => Op::Mul(tape.constant(c), of(a)),
+                Node::IfAtMost([a, b, yes, no]) => Op::Select(tape.push(Op::LessEqual(of(a), of(b))), of(yes), of(no)),
                 Node::TimesStep(a) => Op::Mul(tape.push(Op::Step), of(a)),
                 Node::PerStep(a) => Op::Div(of(a), tape.push(Op::Step)),
                 Node::Stretched(a) => Op::Mul(tape.push(Op::Time), of(a)),

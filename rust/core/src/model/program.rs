@@ -107,6 +107,12 @@ pub enum Entry {
     ByTimeV,
     /// Likewise of y.
     ByTimeY,
+    /// The sum of the squares of all numbers of both blocks, at each place of a block of v.
+    SquareV(Block, Block),
+    /// Likewise of y.
+    SquareY(Block, Block),
+    /// Number by number the third of these blocks where the first is at most the second, else the fourth.
+    IfAtMost([Block; 4]),
 }
 
 impl Entry {
@@ -119,6 +125,8 @@ impl Entry {
             Entry::SeriesV(_, a, b) | Entry::SeriesY(_, a, b) => vec![a, b],
             Entry::ImplicitV(_, a, b) | Entry::ImplicitY(_, a, b) => vec![a, b],
             Entry::Kick(_, a, b) | Entry::DriftV(_, a, b) | Entry::DriftY(_, a, b) => vec![a, b],
+            Entry::SquareV(a, b) | Entry::SquareY(a, b) => vec![a, b],
+            Entry::IfAtMost(blocks) => blocks.to_vec(),
         }
     }
 
@@ -140,6 +148,9 @@ impl Entry {
             Entry::Kick(t, a, b) => Entry::Kick(t, to(a), to(b)),
             Entry::DriftV(c, a, b) => Entry::DriftV(c, to(a), to(b)),
             Entry::DriftY(c, a, b) => Entry::DriftY(c, to(a), to(b)),
+            Entry::SquareV(a, b) => Entry::SquareV(to(a), to(b)),
+            Entry::SquareY(a, b) => Entry::SquareY(to(a), to(b)),
+            Entry::IfAtMost(blocks) => Entry::IfAtMost(blocks.map(to)),
         }
     }
 
@@ -165,6 +176,9 @@ impl Entry {
             Entry::Kick(t, a, b) => (16, t.0.to_bits(), a.0, b.0),
             Entry::DriftV(c, a, b) => (17, c.to_bits(), a.0, b.0),
             Entry::DriftY(c, a, b) => (18, c.to_bits(), a.0, b.0),
+            Entry::SquareV(a, b) => (19, 0, a.0, b.0),
+            Entry::SquareY(a, b) => (20, 0, a.0, b.0),
+            Entry::IfAtMost([a, b, yes, no]) => (21, u64::from(a.0) << 32 | u64::from(b.0), yes.0, no.0),
         }
     }
 }
@@ -254,6 +268,19 @@ impl Rates {
     /// h times the derivatives of h·v̇ and h·ẏ by the time, at the start of the step.
     pub(crate) fn by_time(self) -> (Block, Block) {
         (write(Entry::ByTimeV), write(Entry::ByTimeY))
+    }
+
+    /// The first increments of v and y if these corrections are in all no longer than those, else the second ones.
+    pub(crate) fn if_shorter(
+        self,
+        (v, y): (Block, Block),
+        (than_v, than_y): (Block, Block),
+        yes: (Block, Block),
+        no: (Block, Block),
+    ) -> (Block, Block) {
+        let (of_v, of_y) = (write(Entry::SquareV(v, y)), write(Entry::SquareY(v, y)));
+        let (most_v, most_y) = (write(Entry::SquareV(than_v, than_y)), write(Entry::SquareY(than_v, than_y)));
+        (write(Entry::IfAtMost([of_v, most_v, yes.0, no.0])), write(Entry::IfAtMost([of_y, most_y, yes.1, no.1])))
     }
 
     /// The velocity whose increment of y is d, in a second-order system.
@@ -426,11 +453,22 @@ impl Program {
                 ),
                 Entry::ByTimeV => implicit.as_ref().map_or_else(|| unknown(v), |it| it.by_time(h)[0].clone()),
                 Entry::ByTimeY => implicit.as_ref().map_or_else(|| unknown(y), |it| it.by_time(h)[1].clone()),
+                Entry::SquareV(a, b) => DVector::from_element(v.len(), square(of(a).iter().chain(of(b)))),
+                Entry::SquareY(a, b) => DVector::from_element(y.len(), square(of(a).iter().chain(of(b)))),
+                Entry::IfAtMost([a, b, yes, no]) => {
+                    let [a, b, yes, no] = [a, b, yes, no].map(of);
+                    DVector::from_fn(yes.len(), |i, _| N::choose(a[i].at_most(b[i]), yes[i], no[i]))
+                }
             };
             blocks.push(made);
         }
         self.results.iter().map(|block| blocks[block.0 as usize].clone()).collect()
     }
+}
+
+/// The sum of the squares, from the first on; 0 of no numbers.
+pub(crate) fn square<'a, N: Number>(numbers: impl Iterator<Item = &'a N>) -> N {
+    numbers.map(|x| *x * *x).reduce(|sum, square| sum + square).unwrap_or(N::of(0.0))
 }
 
 /// Coefficients of v and y, from the first on.

@@ -1,6 +1,10 @@
 //! The driver of adaptive steps: every member has its own time and step, and when one is done its lane takes the next.
 
+mod events;
+
 use std::{ops::Range, sync::Arc};
+
+use self::events::{Looks, length};
 
 use super::{
     adaptive_plan::{Assignment, Part, Status},
@@ -10,6 +14,7 @@ use super::{
 };
 use crate::{
     error::Error,
+    events::watch::Stop as EventStop,
     group::AdaptiveBatch,
     stage::{Machine, Stop},
     step::{key::StepKind, pace::Pace, tapes::Traced},
@@ -105,7 +110,7 @@ impl Prepared {
     /// Makes the run, and returns whether it did: not if it takes long.
     pub fn run(&mut self, plan: &AdaptiveRun, arrays: Arrays) -> Result<bool, Error> {
         let Some(group) = self.group.take() else { return Ok(false) };
-        let mut worker = Worker { plan, group, waypoints: WaypointSearch::new(plan.v.len() + plan.y.len()) };
+        let mut worker = Worker::of(plan, group);
         let mut left = self.most_checks;
         let mut go_on = |ended| {
             left = if ended == 0 { left.saturating_sub(1) } else { left };
@@ -121,15 +126,12 @@ impl Prepared {
     }
 }
 
-/// How long a step is that ends at the wall if it would cross it.
-fn length(t: f64, h: f64, wall: f64) -> f64 {
-    if wall < t + h { wall - t } else { h }
-}
-
 struct Worker<'a> {
     plan: &'a AdaptiveRun<'a>,
     group: Box<dyn AdaptiveBatch>,
     waypoints: WaypointSearch,
+    /// Where events are looked for.
+    looks: Option<Looks<'a>>,
 }
 
 impl<'a> Worker<'a> {
@@ -138,12 +140,21 @@ impl<'a> Worker<'a> {
         let machine = Machine { threads, ..plan.machine };
         let mut group = plan.model.adaptive(traced, machine, plan.members, plan.budget as f64)?;
         group.set_stop_flag(stop);
-        Ok(Worker { plan, group, waypoints: WaypointSearch::new(plan.v.len() + plan.y.len()) })
+        Ok(Worker::of(plan, group))
+    }
+
+    fn of(plan: &'a AdaptiveRun<'a>, group: Box<dyn AdaptiveBatch>) -> Self {
+        let waypoints = WaypointSearch::new(plan.v.len() + plan.y.len());
+        let looks = plan.events.map(|events| Looks::new(events, group.lanes()));
+        Worker { plan, group, waypoints, looks }
     }
 
     fn part(&mut self, mut part: Part, go_on: GoOn) -> Result<(), Error> {
         if part.attempt_log.rows() > 0 {
             return self.attempt_log(part, go_on);
+        }
+        if let Some(looks) = &mut self.looks {
+            looks.watch.begin(part.first, part.count);
         }
         let mut waiting = 0..part.count;
         let mut assignments: Vec<Option<Assignment>> = (0..self.group.lanes()).map(|_| None).collect();
@@ -169,10 +180,19 @@ impl<'a> Worker<'a> {
                     *assigned = self.update_lane(&mut part, lane, taken, &mut waiting, go_on)?;
                 }
             }
-            let attempts = self.attempts_before_check(&assignments);
+            let attempts = if self.looks.is_some() { 1 } else { self.attempts_before_check(&assignments) };
+            if let Some(looks) = &mut self.looks {
+                let first = part.first;
+                looks.before(&*self.group, |lane| Some(first + assignments[lane].as_ref()?.member));
+            }
             self.waypoints.attempt(&mut *self.group, &mut part, attempts, &mut assignments);
             if self.plan.every == 0 {
                 self.group.find_running(self.plan.budget as f64, &mut runs);
+            }
+            if self.looks.is_some() {
+                self.look(&part, &mut assignments);
+                let stops = assignments.iter().map(|assigned| assigned.as_ref().is_some_and(|assigned| assigned.stop.is_some()));
+                runs.iter_mut().zip(stops).for_each(|(runs, stops)| *runs &= !stops);
             }
             unseen += if self.is_large() { MOST_ATTEMPTS } else { attempts };
             if unseen >= MOST_ATTEMPTS {
@@ -181,6 +201,9 @@ impl<'a> Worker<'a> {
                     return Err(Error::Interrupted);
                 }
             }
+        }
+        if let Some(looks) = &mut self.looks {
+            looks.watch.end();
         }
         Ok(())
     }
@@ -355,6 +378,10 @@ impl<'a> Worker<'a> {
         let before = &plan.jumps[..plan.jumps.len() / 2];
         let next = before.get(before.partition_point(|row| row.at(at) <= pace.t));
         self.waypoints.expect_after(pace.accepted);
+        if let Some(looks) = &mut self.looks {
+            // A held step was looked at before, up to the last time of the run that goes on.
+            looks.begin(lane, at, if pace.held > 0.0 { pace.target } else { f64::NEG_INFINITY });
+        }
         self.group.set_pace(lane, Pace { target: pace.t, wall: next.map_or(f64::INFINITY, |row| row.at(at)), ..pace });
         Assignment {
             accepted: pace.accepted,
@@ -376,6 +403,13 @@ impl<'a> Worker<'a> {
     ) -> Result<Option<Assignment>, Error> {
         let (plan, budget) = (self.plan, self.plan.budget as f64);
         loop {
+            if let Some(stop) = assigned.stop.take() {
+                self.end_at(part, lane, &mut assigned, &stop);
+                match self.next_member(part, lane, waiting, go_on)? {
+                    Some(next) => assigned = next,
+                    None => return Ok(None),
+                }
+            }
             let is_full = self.keep_step(part, lane, &mut assigned);
             if let Some((origin, rejected)) = assigned.origin.take() {
                 // An extra step whose error was not tolerated did not change the state; the run has gone on with shorter steps.
@@ -383,6 +417,8 @@ impl<'a> Worker<'a> {
                     self.save(part, lane, &assigned);
                     assigned.next += 1;
                     self.group.set_state(lane, &origin);
+                } else if let Some(looks) = &mut self.looks {
+                    looks.watch.has_other_steps(part.first + assigned.member);
                 }
             }
             if !plan.jumps.is_empty() {
@@ -418,16 +454,34 @@ impl<'a> Worker<'a> {
                     return Ok(Some(assigned));
                 }
             }
-            self.end(part, lane, &assigned, &pace, is_full.then_some(Status::Full));
-            if !go_on(1) {
-                return Err(Error::Interrupted);
+            match self.stop_in_held(part, lane, &assigned, &pace) {
+                Some(stop) => self.end_at(part, lane, &mut assigned, &stop),
+                None => self.end(part, lane, &assigned, &pace, is_full.then_some(Status::Full)),
             }
-            let Some(member) = waiting.next() else {
-                self.group.set_pace(lane, pace.idle()); // nothing runs in an empty lane
-                return Ok(None);
-            };
-            assigned = self.begin_member(part, lane, member);
+            match self.next_member(part, lane, waiting, go_on)? {
+                Some(next) => assigned = next,
+                None => return Ok(None),
+            }
         }
+    }
+
+    /// Puts the next member into a lane, if one is left.
+    fn next_member(
+        &mut self,
+        part: &Part,
+        lane: usize,
+        waiting: &mut Range<usize>,
+        go_on: GoOn,
+    ) -> Result<Option<Assignment>, Error> {
+        if !go_on(1) {
+            return Err(Error::Interrupted);
+        }
+        if let Some(member) = waiting.next() {
+            return Ok(Some(self.begin_member(part, lane, member)));
+        }
+        let pace = self.group.pace(lane);
+        self.group.set_pace(lane, pace.idle()); // nothing runs in an empty lane
+        Ok(None)
     }
 
     /// Of a step that is held and whose coefficients are known: saves the state at the next time within it, or takes it.
@@ -440,6 +494,17 @@ impl<'a> Worker<'a> {
             waypoints::keep_lane(&*self.group, part, lane, assigned, accepted as u64);
             self.waypoints.expect_after(accepted);
             return;
+        }
+        let mut state = vec![0.0; self.plan.v.len() + self.plan.y.len()];
+        while pace.holds() && self.group.sum_of_terms(lane, pace.target - pace.t, &mut state) {
+            self.write(part, assigned, &state);
+            assigned.next += 1;
+            pace.extra_steps += 1.0;
+            let Some(target) = self.plan.at.get(assigned.next) else { return self.group.set_pace(lane, pace) };
+            pace.target = target.at(member);
+        }
+        if !pace.holds() {
+            return self.group.set_pace(lane, pace);
         }
         pace.extra = pace.target - pace.t;
         let origin = self.group.state(lane);
@@ -482,12 +547,57 @@ impl<'a> Worker<'a> {
     }
 
     fn save(&self, part: &mut Part, lane: usize, assigned: &Assignment) {
-        let state = self.group.state(lane);
+        self.write(part, assigned, &self.group.state(lane));
+    }
+
+    fn write(&self, part: &mut Part, assigned: &Assignment, state: &[f64]) {
         let (v, y) = state.split_at(self.plan.v.len());
         for (rows, block) in [(&mut part.saved_v, v), (&mut part.saved_y, y)] {
             for (i, number) in block.iter().enumerate() {
                 rows.row(assigned.next * block.len() + i)[assigned.member] = *number;
             }
+        }
+    }
+
+    /// Looks for events in the steps that lanes have just made.
+    fn look(&mut self, part: &Part, assignments: &mut [Option<Assignment>]) {
+        let Some(mut looks) = self.looks.take() else { return };
+        let member = |lane: usize| {
+            let assigned: Option<&Assignment> = assignments.get(lane)?.as_ref();
+            assigned.filter(|assigned| assigned.origin.is_none()).map(|assigned| part.first + assigned.member)
+        };
+        let stops = looks.after(&*self.group, member, |member| self.plan.at.last().map_or(f64::NAN, |row| row.at(member)));
+        for (lane, stop) in stops {
+            if let Some(assigned) = &mut assignments[lane] {
+                assigned.stop = Some(stop);
+            }
+        }
+        self.looks = Some(looks);
+    }
+
+    /// Where a member stops in the step that it holds at its end.
+    fn stop_in_held(&mut self, part: &Part, lane: usize, assigned: &Assignment, pace: &Pace<f64>) -> Option<EventStop> {
+        let (looks, last) = (self.looks.as_mut()?, self.plan.at.last()?);
+        let member = part.first + assigned.member;
+        let ends = assigned.next == self.plan.at.len() && pace.held > 0.0;
+        if ends { looks.held(&*self.group, lane, member, pace, last.at(member)) } else { None }
+    }
+
+    /// Ends a member where an event stopped it: in that state, also at all later times.
+    fn end_at(&self, part: &mut Part, lane: usize, assigned: &mut Assignment, stop: &EventStop) {
+        let member = part.first + assigned.member;
+        for (i, at) in self.plan.at.iter().enumerate() {
+            if at.at(member) >= stop.t {
+                assigned.next = i;
+                self.write(part, assigned, &stop.state);
+            }
+        }
+        assigned.next = self.plan.at.len();
+        let pace = self.group.pace(lane);
+        let accepted = (stop.step.number + 1) as f64;
+        self.end(part, lane, assigned, &Pace { t: stop.t, accepted, work: f64::NAN, ..pace }, None);
+        for (row, number) in stop.state.iter().enumerate() {
+            part.state.row(row)[assigned.member] = *number;
         }
     }
 }

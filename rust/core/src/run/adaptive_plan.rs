@@ -4,7 +4,11 @@ use super::{
     Model,
     columns::{Columns, cut},
 };
-use crate::{model::spec::Row, stage::Machine};
+use crate::{
+    events::{motion::Events, watch::Stop},
+    model::spec::Row,
+    stage::Machine,
+};
 
 /// A run to be made.
 #[derive(Clone, Debug)]
@@ -32,6 +36,8 @@ pub struct AdaptiveRun<'a> {
     pub y: Vec<Row<'a>>,
     /// How many members.
     pub members: usize,
+    /// What is looked for in the steps.
+    pub events: Option<&'a Events<'a>>,
 }
 
 /// How a member ended.
@@ -149,11 +155,13 @@ pub(super) struct Assignment {
     pub(super) kept_steps: usize,
     /// How many accepted steps it had when a waypoint was looked for last.
     pub(super) passed: u64,
+    /// Where an event stops it.
+    pub(super) stop: Option<Stop>,
 }
 
 impl Assignment {
     /// Of a member of the log of attempts.
     pub(super) fn of_log(member: usize, next: usize) -> Assignment {
-        Assignment { member, next, origin: None, held_before: false, accepted: 0.0, kept_steps: 0, passed: 0 }
+        Assignment { member, next, origin: None, held_before: false, accepted: 0.0, kept_steps: 0, passed: 0, stop: None }
     }
 }

@@ -2,7 +2,7 @@
 
 use std::time::{Duration, Instant};
 
-use super::{Model, StepStrategy};
+use super::{MIN_SOLUTIONS, Model, StepStrategy};
 use crate::{
     error::Error,
     kernel::{
@@ -11,7 +11,7 @@ use crate::{
         writer,
     },
     stage::Machine,
-    step::tapes::Tapes,
+    step::tapes::{Tapes, Traced},
     tape::{
         Counts,
         real::{Precision, Real},
@@ -69,6 +69,12 @@ impl Interpreted {
     }
 }
 
+/// Of how many steps a run is whose step is explained: of very many, but where these would be one tape for the equations of a large
+/// system, whose listing has some ten thousand lines.
+fn explained_steps(traced: &Traced) -> f64 {
+    if traced.solves_rows { MIN_SOLUTIONS - 1.0 } else { f64::INFINITY }
+}
+
 fn counts(body: &Body) -> Counts {
     let mut counts = Counts::default();
     body.ops.iter().for_each(|op| counts.note(*op));
@@ -79,7 +85,7 @@ impl Model<'_> {
     /// Traces and compiles the step anew, for so many members; none if it is too long for one tape.
     pub fn compiled(&self, machine: Machine, members: usize) -> Result<Option<Compiled>, Error> {
         let traced = self.traced()?;
-        if !matches!(self.way(&traced, machine, members, f64::INFINITY), StepStrategy::Tape) {
+        if !matches!(self.way(&traced, machine, members, explained_steps(&traced)), StepStrategy::Tape) {
             return Ok(None);
         }
         match self.key.precision {
@@ -107,7 +113,7 @@ impl Model<'_> {
         let compile = began.elapsed();
         let is_packed = written.is_some_and(|kernel| kernel.packing().is_some());
         let packing =
-            written.filter(|_| runner.packs()).and_then(|_| pack::best(&split.body)).map(|(verdict, _)| (is_packed, verdict));
+            written.filter(|_| runner.packs()).and_then(|_| pack::best(runner.body())).map(|(verdict, _)| (is_packed, verdict));
         Ok(Some(Compiled {
             written: tapes.written,
             computed: counts(&split.body),
@@ -128,7 +134,7 @@ impl Model<'_> {
     /// products of matrices ("matrix"). None if it is one tape. `paced`: for adaptive steps.
     pub fn in_parts(&self, machine: Machine, members: usize, paced: bool) -> Result<Option<(&'static str, usize, usize)>, Error> {
         let traced = self.traced()?;
-        let steps = if paced { 0.0 } else { f64::INFINITY };
+        let steps = if paced { 0.0 } else { explained_steps(&traced) };
         let mut way = self.way(&traced, machine, members, steps);
         if paced && !matches!(way, StepStrategy::Tape | StepStrategy::Matrix) {
             way = match (way, self.way(&traced, machine, 1, steps)) {

@@ -1,6 +1,10 @@
 //! The driver of fixed steps: shares members among threads, saves states, and finds which members diverged.
 
+mod events;
+
 use std::{sync::Arc, time::Instant};
+
+use self::events::{Looks, Stepped};
 
 use super::{
     Model,
@@ -9,6 +13,7 @@ use super::{
 };
 use crate::{
     error::Error,
+    events::{motion::Events, watch::Watch},
     group::{Group, lanes::Lanes},
     model::spec::Row,
     stage::{Clock, Machine, Stop},
@@ -42,6 +47,8 @@ pub struct FixedRun<'a> {
     pub carried: bool,
     /// How many members have parameters of their own; those of further members repeat them.
     pub own: usize,
+    /// What is looked for in the steps.
+    pub events: Option<&'a Events<'a>>,
 }
 
 impl FixedRun<'_> {
@@ -240,12 +247,14 @@ struct Worker<'a, T: Real> {
     full: Option<Box<dyn Group<T>>>,
     rest: Option<(usize, Box<dyn Group<T>>)>,
     good: Good<T>,
+    watch: Option<Watch<'a>>,
     stop: &'a Stop,
 }
 
 impl<'a, T: Steppable> Worker<'a, T> {
     fn new(plan: &'a FixedRun<'a>, traced: &'a Arc<Traced>, machine: Machine, stop: &'a Stop) -> Self {
-        Worker { plan, traced, machine, full: None, rest: None, good: Good::default(), stop }
+        let watch = plan.events.map(Watch::new);
+        Worker { plan, traced, machine, full: None, rest: None, good: Good::default(), watch, stop }
     }
 
     /// The group for so many members that are left, of so many lanes as fit if not all are taken at once.
@@ -274,12 +283,18 @@ impl<'a, T: Steppable> Worker<'a, T> {
         let lanes = plan.model.lanes::<T>(self.traced, self.machine, plan.members, plan.total())?;
         let first_piece = self.traced.steps_of(lanes, OPERATIONS_TO_FIRST_CHECK).min(STEPS_TO_FIRST_CHECK);
         let mut from = 0;
+        let mut watch = self.watch.take();
+        if let Some(watch) = &mut watch {
+            watch.begin(part.first, members);
+        }
         while from < members {
             let mut good = std::mem::take(&mut self.good);
             let group = self.group(members - from, lanes)?;
             let count = (members - from).min(group.lanes());
             let (part, checked) = (&mut part, plan.first);
-            let mut job = Job { plan, carries, first_piece, group, part, from, count, good: &mut good, checked };
+            let notices = plan.model.key.signature.watched.is_some() && !group.tally().is_empty();
+            let looks = watch.as_mut().map(|watch| Looks::new(watch, notices, group.lanes(), part.first + from, count));
+            let mut job = Job { plan, carries, first_piece, group, part, from, count, good: &mut good, checked, looks };
             let ran = job.run(go_on);
             self.good = good;
             if !ran {
@@ -287,6 +302,10 @@ impl<'a, T: Steppable> Worker<'a, T> {
             }
             from += count;
         }
+        if let Some(watch) = &mut watch {
+            watch.end();
+        }
+        self.watch = watch;
         Ok(())
     }
 }
@@ -299,8 +318,10 @@ struct Checks {
 }
 
 /// One group's run.
-struct Job<'a, 'b, T: Real> {
+struct Job<'a, 'b, 'w, T: Real> {
     plan: &'a FixedRun<'a>,
+    /// Where events are looked for.
+    looks: Option<Looks<'a, 'w, T>>,
     /// The v slot holds something else than v between steps: finish before keeping it.
     carries: bool,
     /// How many steps until the first check.
@@ -339,7 +360,7 @@ fn put<T: Copy>(rows: &mut Columns<T>, at: usize, from: usize, count: usize, slo
     }
 }
 
-impl<T: Real> Job<'_, '_, T> {
+impl<T: Real> Job<'_, '_, '_, T> {
     /// Whether it ran to its end.
     fn run(&mut self, go_on: &mut dyn FnMut(u64) -> bool) -> bool {
         let (plan, lanes) = (self.plan, self.group.lanes());
@@ -373,14 +394,14 @@ impl<T: Real> Job<'_, '_, T> {
         let first = if numbers > LARGE_MEMBER_NUMBERS { 1 } else { self.first_piece };
         let mut checks = Checks { piece: first, longest, began: Instant::now() };
         // A run that keeps every state makes several steps at once where it can.
-        let keeps_all = plan.every == Some(1) && self.group.recorded() == 0;
+        let keeps_all = plan.every == Some(1) && self.group.recorded() == 0 && self.looks.is_none();
         let unrolled = if keeps_all { self.group.unrolled(&plan.model.spec, self.part.first + self.from, self.count) } else { 0 };
         let mut i = 0;
         while i < kept(plan.steps, plan.every) {
             let until = plan.first + save(plan.steps, plan.every, i);
             while k < until {
                 let n = (until - k).min(self.checked + checks.piece - k);
-                self.group.advance(k, n);
+                self.advance(k, n);
                 k += n;
                 if !self.check_if_due(k, &mut checks, go_on) {
                     return false;
@@ -411,7 +432,52 @@ impl<T: Real> Job<'_, '_, T> {
             at += block.len() / lanes;
         }
         put(&mut self.part.tally, 0, self.from, self.count, self.group.tally(), lanes);
+        if let Some(looks) = self.looks.take() {
+            self.write_stops(&looks);
+        }
         true
+    }
+
+    /// Writes the states of members that stopped, also for all later saved states.
+    fn write_stops(&mut self, looks: &Looks<T>) {
+        let plan = self.plan;
+        let (p, q) = self.rows();
+        for (lane, stop) in looks.stops().iter().enumerate() {
+            let Some(stop) = stop else { continue };
+            let column = self.from + lane;
+            self.part.first_bad[column] = -1;
+            for i in 0..kept(plan.steps, plan.every) {
+                if save(plan.steps, plan.every, i) <= stop.step.number - plan.first {
+                    continue;
+                }
+                let (v, y) = stop.state.split_at(p);
+                v.iter().enumerate().for_each(|(row, x)| self.part.saved_v.row(i * p + row)[column] = T::of(*x));
+                y.iter().enumerate().for_each(|(row, x)| self.part.saved_y.row(i * q + row)[column] = T::of(*x));
+            }
+            // What the method would carry from there on is not known.
+            (0..self.part.carry.rows()).for_each(|row| self.part.carry.row(row)[column] = T::of(f64::NAN));
+        }
+    }
+
+    /// Makes steps.
+    fn advance(&mut self, k: i64, n: i64) {
+        match self.looks.take() {
+            None => self.group.advance(k, n),
+            Some(mut looks) => {
+                let (from, count) = (self.from, self.count);
+                let mut on = Stepped {
+                    carries: self.carries,
+                    spec: &self.plan.model.spec,
+                    first: self.part.first + from,
+                    count,
+                    h: self.plan.clock.h,
+                    first_bad: &self.part.first_bad[from..from + count],
+                    group: &mut *self.group,
+                };
+                looks.advance(&mut on, k, n);
+                self.looks = Some(looks);
+            }
+        }
     }
 
     /// Checks at step `k` which members diverged, if a check is due; false if the run is to end.

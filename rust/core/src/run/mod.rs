@@ -88,7 +88,14 @@ impl Model<'_> {
             };
         }
         let long = kernel_of(&self.key.signature.system);
-        let large = step > MAX_TAPE_OPERATIONS;
+        let is_paced = matches!(self.key.how, StepKind::Attempts { .. });
+        let attempts = if is_paced { ATTEMPTS * members as f64 } else { steps };
+        if traced.solves_rows && step <= MAX_TAPE_OPERATIONS && attempts >= MIN_SOLUTIONS {
+            return StepStrategy::Tape;
+        }
+        // Of a batch with adaptive steps a tape alone steps several members at once.
+        let is_soon_large = long.is_some() && !is_paced;
+        let large = step > if is_soon_large { HAND_WRITTEN_OPERATIONS } else { MAX_TAPE_OPERATIONS } || traced.solves_rows;
         // Tapes of rates must first be traced and compiled, which takes time, unless that was done before.
         let pays = || {
             steps * (step / rates.max(1)) as f64 > (MIN_EVALUATIONS_PER_OPERATION * rates) as f64
@@ -184,8 +191,8 @@ impl Model<'_> {
     }
 }
 
-/// The most bytes that a thread keeps for each number of a state, including the stages of DOP853.
-const BYTES_PER_NUMBER: usize = 160;
+/// The most bytes that a thread keeps for each number of a state, including the sixteen stages of Verner's 9(8).
+const BYTES_PER_NUMBER: usize = 192;
 /// The most bytes that a thread keeps for each parameter or sample.
 const BYTES_PER_PARAMETER: usize = 32;
 /// Less memory than this is not checked.
@@ -204,6 +211,14 @@ enum StepStrategy {
     Matrix,
 }
 
+/// Operations of a step of several members from which on, where there is a kernel that is written by hand, it is that or tapes of
+/// the rates: as fast as one tape, and sooner there.
+const HAND_WRITTEN_OPERATIONS: usize = 4000;
+/// A tape that solves many equations takes some microseconds an operation to trace and to write, and a third of a nanosecond less
+/// in a step than solving over rows: it is worth it from so many steps of members on.
+const MIN_SOLUTIONS: f64 = 20_000.0;
+/// So many attempts of a member with adaptive steps are expected.
+const ATTEMPTS: f64 = 300.0;
 /// Operations of the matrix form from which on a hand-written kernel is faster than a tape, for a single member.
 const SINGLE_MATRIX_OPERATIONS: usize = 2 * 9 * 9;
 /// The same for several members, one by one.

@@ -282,8 +282,7 @@ impl<T: Steppable> World<T> {
         // The slots are no longer those of the caller's arrays.
         self.is_written = false;
         let held = if self.carries { self.held() } else { Vec::new() };
-        let finite = |numbers: &[T]| all_below(numbers, T::INFINITY);
-        let is_finite = finite(saved_v) && finite(saved_y) && all_below(&held, huge(self.clock.h));
+        let is_finite = are_finite(saved_v, saved_y) && all_below(&held, huge(self.clock.h));
         is_finite.then_some(held)
     }
 
@@ -439,6 +438,11 @@ impl<T: Steppable> World<T> {
         }
         true
     }
+}
+
+/// Whether both blocks are finite.
+pub fn are_finite<T: Real>(v: &[T], y: &[T]) -> bool {
+    all_below(v, T::INFINITY) && all_below(y, T::INFINITY)
 }
 
 /// Operations between two checks of whether to stop: some milliseconds.

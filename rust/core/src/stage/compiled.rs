@@ -93,7 +93,7 @@ impl<T: Real> CompiledStage<T> {
             single: Interpreter::new(&split.member, 1, Level::Baseline),
             step: Runner::long(&split.step, level, STEPS_AT_ONCE as usize),
             clock: (!split.clock.next.is_empty()).then(|| Runner::long(&split.clock, level, STEPS_AT_ONCE as usize)),
-            moment: Runner::long(&split.step, Level::Baseline, 1),
+            moment: Runner::long(&split.step, level, 1),
             unrolled: OnceLock::new(),
             runner,
         })

@@ -242,6 +242,9 @@ impl<T: Real> PreparedStage<T> {
     /// more.
     pub(crate) fn compile_now(&mut self) {
         self.compiled.runner.write();
+        if !self.compiled.step.body().ops.is_empty() {
+            self.compiled.step.write();
+        }
         self.most_tables = 1;
     }
 

@@ -13,6 +13,8 @@ pub struct Acceptance {
     pub own: bool,
     /// Numbers of v, then of y, by their places, that must not become negative.
     pub positive: Vec<u32>,
+    /// Whether what rounding leaves out of each number of the state is kept, for the next step to add.
+    pub compensated: bool,
 }
 
 impl Acceptance {
@@ -26,10 +28,10 @@ impl Acceptance {
         [of_v, counted(&self.groups) - of_v]
     }
 
-    /// How many numbers stand behind those of the pace: the largest sizes, and the tolerances of their own.
+    /// How many numbers stand behind those of the pace: `Scales`.
     pub fn numbers(&self, v: usize, y: usize) -> usize {
         let [of_v, of_y] = self.counts(v, y);
-        (of_v + of_y) * if self.own { 3 } else { 1 }
+        (of_v + of_y) * if self.own { 5 } else { 3 } + if self.compensated { v + y } else { 0 }
     }
 
     /// The size of each group of components: of one number its absolute value, of several their length.
@@ -59,15 +61,31 @@ fn length<'a, N: Number>(mut numbers: impl ExactSizeIterator<Item = &'a N>) -> N
 pub(crate) struct Scales<N> {
     /// The largest size so far of each group.
     pub longest: Vec<N>,
+    /// What the rounding of the rates of each group makes in a unit of time, as far as it is known: see [`Pace::heard`].
+    pub noise: Vec<N>,
+    /// Of each group the error of steps that failed by it over the power 3/2 of their length, the largest; or zero.
+    pub failed: Vec<N>,
     /// Tolerances of their own: the relative one of each group, then the absolute one of each; empty if there are none.
     pub own: Vec<N>,
+    /// What each number of v, then of y, is more than the state has, where the method keeps it; else empty.
+    pub low: Vec<N>,
 }
 
 impl<N: Number> Scales<N> {
-    /// From its numbers.
-    pub(crate) fn of(numbers: &[N], own: bool) -> Self {
-        let (longest, own) = numbers.split_at(if own { numbers.len() / 3 } else { numbers.len() });
-        Scales { longest: longest.to_vec(), own: own.to_vec() }
+    /// From its numbers, for a state of so many numbers.
+    pub(crate) fn of(numbers: &[N], acceptance: &Acceptance, state: usize) -> Self {
+        let (numbers, low) = numbers.split_at(numbers.len() - if acceptance.compensated { state } else { 0 });
+        let groups = numbers.len() / if acceptance.own { 5 } else { 3 };
+        let (longest, rest) = numbers.split_at(groups);
+        let (noise, rest) = rest.split_at(groups);
+        let (failed, own) = rest.split_at(groups);
+        let [longest, noise, failed, own, low] = [longest, noise, failed, own, low].map(<[N]>::to_vec);
+        Scales { longest, noise, failed, own, low }
+    }
+
+    /// Its numbers.
+    pub(crate) fn numbers(&self) -> Vec<N> {
+        [&self.longest[..], &self.noise[..], &self.failed[..], &self.own[..], &self.low[..]].concat()
     }
 
     /// The relative and the absolute tolerance of a group.

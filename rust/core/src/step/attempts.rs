@@ -93,14 +93,13 @@ impl AttemptsOf<'_> {
         let first = self.shape.v + self.shape.y;
         let pace = Pace::of(std::array::from_fn(|i| Symbol::new(Op::State((first + i) as u32))));
         let numbers = block(first + Pace::<Symbol>::NUMBERS, self.acceptance.numbers(self.shape.v, self.shape.y));
-        (pace, Scales::of(numbers.as_slice(), self.acceptance.own))
+        (pace, Scales::of(numbers.as_slice(), self.acceptance, first))
     }
 
     /// The next state: v and y, the pace, and the sizes.
-    fn next(&self, pace: &Pace<Symbol>, longest: &[Symbol], v: &Block<Symbol>, y: &Block<Symbol>) -> Vec<Id> {
-        let own = self.pace().1.own;
+    fn next((pace, scales): (&Pace<Symbol>, &Scales<Symbol>), v: &Block<Symbol>, y: &Block<Symbol>) -> Vec<Id> {
         let mut next = ids([v, y]);
-        next.extend(pace.numbers().iter().chain(longest).chain(&own).map(|symbol| symbol.0));
+        next.extend(pace.numbers().iter().chain(&scales.numbers()).map(|symbol| symbol.0));
         next
     }
 
@@ -163,12 +162,13 @@ impl AttemptsOf<'_> {
         let (tried, projected) = pairs.split_at(pairs.len() - 1);
         let blocks: Vec<&[Symbol]> = tried.iter().flatten().map(Block::as_slice).collect();
         let sizes = Made::of(self.acceptance, [v.as_slice(), y.as_slice()], &blocks);
-        let sizes = Made { rounding: SINGLE_ROUNDING, ..sizes };
+        let has_mass = self.signature.equations.as_ref().is_some_and(|equations| equations.mass.is_some());
+        let sizes = Made { rounding: SINGLE_ROUNDING, has_mass, ..sizes };
         let outlook = pace.outlook(Symbol::new(Op::Param(BUDGET)));
-        let (next, longest, took) = judge(&pace, &scales, order, self.acceptance.counts(p, q), &sizes, outlook);
+        let (next, scales, took) = judge(&pace, &scales, order, self.acceptance.counts(p, q), &sizes, outlook);
         let work = Symbol::new(Op::State((rows.judged + rows.results - 1) as u32));
         let next = Pace { work: Symbol::choose(took & !outlook.is_extra, pace.work + work, pace.work), ..next };
-        let mut next = self.next(&next, &longest, &taken(took, &projected[0][0], &v), &taken(took, &projected[0][1], &y));
+        let mut next = Self::next((&next, &scales), &taken(took, &projected[0][0], &v), &taken(took, &projected[0][1], &y));
         next.extend(ids([&block(rows.judged, rows.results)]));
         next
     }
@@ -178,8 +178,8 @@ impl AttemptsOf<'_> {
         let (rates, projected) = (|step: Symbol| self.rates(step), self.after());
         let system = Attempted { rates: &rates, projected: projected.as_ref() };
         let budget = Symbol::new(Op::Param(BUDGET));
-        let (pace, longest, v, y) = attempt(program, &system, order, self.acceptance, (pace, &scales), budget, &v, &y);
-        self.next(&pace, &longest, &v, &y)
+        let (pace, scales, v, y) = attempt(program, &system, order, self.acceptance, (pace, &scales), budget, &v, &y);
+        Self::next((&pace, &scales), &v, &y)
     }
 
     /// Steps by a series of that order, and its coefficients.
@@ -196,15 +196,23 @@ impl AttemptsOf<'_> {
         let ((v, y), (pace, scales)) = (self.state(), self.pace());
         let budget = Symbol::new(Op::Param(BUDGET));
         let projected = self.projected();
-        let (pace, longest, v, y) =
+        let (pace, scales, v, y) =
             series_pace::attempt(terms, rates, projected.as_ref(), self.acceptance, (pace, &scales), budget, &v, &y);
-        self.next(&pace, &longest, &v, &y)
+        Self::next((&pace, &scales), &v, &y)
+    }
+
+    /// Whether a state that a series reaches is projected, so that it is not the sum of the series alone.
+    pub(crate) fn projects(&self) -> bool {
+        let (v, y) = self.state();
+        let (projected_v, projected_y) = self.projected().project(v.clone(), y.clone());
+        ids([&projected_v, &projected_y]) != ids([&v, &y])
     }
 
     /// Where a member stands at the start, without control.
     pub(crate) fn begin(&self, series: bool) -> Vec<Id> {
         let (v, y) = self.state();
-        let (pace, longest) = self.pace().0.begun(self.of_unit_step().as_ref(), self.acceptance, series, &v, &y);
-        self.next(&pace, &longest, &v, &y)
+        let (pace, scales) = self.pace();
+        let (pace, longest) = pace.begun(self.of_unit_step().as_ref(), self.acceptance, series, &v, &y);
+        Self::next((&pace, &Scales { longest, ..scales }), &v, &y)
     }
 }

@@ -13,7 +13,10 @@ use crate::error::Error;
 
 /// The most operations of all tapes in a cache: about 50 bytes each on the tape, and at most as much again, for each interleaved
 /// vector, as machine code. When a new entry would exceed it, the cache is emptied first.
-const MAX_CACHED_OPERATIONS: usize = 200_000;
+const MAX_CACHED_OPERATIONS: usize = 400_000;
+
+/// An entry takes as much memory as so many operations beside its own, by its key and what surrounds the machine code.
+const OPERATIONS_OF_AN_ENTRY: usize = 400;
 
 /// How often this process, or one that it descends from, began with new caches.
 static GENERATION: AtomicUsize = AtomicUsize::new(0);
@@ -66,7 +69,7 @@ impl<K: Clone + Eq + Hash, V> Cache<K, V> {
             return Ok(Arc::clone(known));
         }
         let (made, size) = make()?;
-        let made = Arc::new(made);
+        let (made, size) = (Arc::new(made), size + OPERATIONS_OF_AN_ENTRY);
         let mut entries = self.entries();
         if entries.operations + size > MAX_CACHED_OPERATIONS {
             *entries = Entries::default();

@@ -8,12 +8,12 @@ pub mod key;
 mod leaves;
 pub mod pace;
 mod properties;
-mod series_pace;
+pub(crate) mod series_pace;
 mod sizes;
 pub(crate) mod solving;
 pub mod tapes;
 pub mod trace;
-mod watch;
+pub(crate) mod watch;
 
 pub(crate) use self::leaves::{block, ids, parameters};
 pub(crate) use self::{leaves::own_times, properties::MAX_TAPE_OPERATIONS};

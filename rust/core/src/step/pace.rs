@@ -2,15 +2,12 @@
 //!
 //! The increments of a step h are h times those of a step of 1. So a system is scaled once, to 1, and stretched to every step.
 
+use super::controller::{MIN_FACTOR, MOVES};
 pub use super::{acceptance::Acceptance, controller::Pace};
 pub(crate) use super::{
     acceptance::Scales,
     controller::{MAX_FACTOR, Outlook},
     sizes::{largest, longer, total},
-};
-use super::{
-    controller::{MIN_FACTOR, MOVES},
-    sizes::absolute,
 };
 use crate::{
     model::{
@@ -31,6 +28,29 @@ const CALM_ROOTS: [f64; 2] = [0.562_341_325_190_349_1, 0.749_894_209_332_455_8];
 /// The highest order of an estimate that counts as low.
 const LOW: u32 = 5;
 
+/// A size counts as no less than this part of the largest that the group has been: 2⁻⁵¹², half of the range of numbers. What
+/// decays to nothing is followed until then.
+pub(crate) const LEAST_PART: f64 = f64::from_bits((1023 - 512) << 52);
+/// Rates that are differences of larger numbers are wrong by the rounding of these, of which the controller knows nothing, and
+/// no step makes the error small beside a size that has become less than that. So the error of a group is rounding
+/// - where a shorter step fails, too, with an error that did not fall by the power 3/2 of the length (that of smooth rates falls
+///   by 3 and more), while the group changes by less than SLOW times the fourth root of the tolerance, so that it is no motion; or
+///   by PUSHES times its size and more, for a force that sets in where next to nothing is left looks alike. Where it is no such
+///   push it is at most ROUNDINGS times what is lost in the largest size so far: beside a pole errors do not fall either.
+///   Not so with algebraic equations: what they are off by after a step is an error of the next one, however short;
+/// - where a group stands, its error being UNLIKE times its change, though that is HOLDS_DOWN of what is tolerated or more;
+/// - where it is no more than ALIKE times what is known of it.
+///
+/// From then on ROUNDED times such an error in the same time is tolerated, up to the tolerance of the largest size so far. That
+/// fades by FADES a step.
+const SLOW: f64 = 0.75;
+const PUSHES: f64 = 1024.0;
+const UNLIKE: f64 = 8.0;
+const HOLDS_DOWN: f64 = 0.125;
+const ALIKE: f64 = 4.0;
+const ROUNDED: f64 = 4.0;
+const FADES: f64 = 15.0 / 16.0;
+const ROUNDINGS: f64 = 64.0;
 /// A change of y in a step that is smaller than this, relative to the largest size of y so far, is lost in rounding, with some
 /// margin. So an error of v that moves y by less is tolerated, however small v is: near rest, where forces cancel, v is only
 /// rounding.
@@ -167,12 +187,16 @@ pub(crate) struct Made<N> {
     pub old: Vec<N>,
     /// After it.
     pub new: Vec<N>,
+    /// Of their difference.
+    pub moved: Vec<N>,
     /// Of one or two estimates of the error.
     pub errors: Vec<Vec<N>>,
     /// The numbers that have to stay positive.
     pub positive: Vec<N>,
     /// See [`ROUNDING`].
     pub rounding: f64,
+    /// Whether there may be algebraic equations.
+    pub has_mass: bool,
 }
 
 impl<N: Number> Made<N> {
@@ -181,19 +205,23 @@ impl<N: Number> Made<N> {
         let sizes = |pair: &[&[N]]| acceptance.sizes(pair[0], pair[1]);
         let mut pairs = blocks.chunks_exact(2);
         let after = pairs.next().unwrap_or(&[&[], &[]]);
+        let differences = |[old, new]: [&[N]; 2]| new.iter().zip(old).map(|(new, old)| *new - *old).collect::<Vec<N>>();
+        let [v, y] = [0, 1].map(|i| differences([old[i], after[i]]));
         let component = |place: u32| after.iter().copied().flatten().nth(place as usize).copied();
         Made {
             old: sizes(&old),
             new: sizes(after),
+            moved: acceptance.sizes(&v, &y),
             errors: pairs.map(sizes).collect(),
             positive: acceptance.positive.iter().filter_map(|place| component(*place)).collect(),
             rounding: ROUNDING,
+            has_mass: false,
         }
     }
 }
 
 /// One attempt at a step: the state goes on, projected, if its error is tolerated. `order` is that of the estimate. An extra step
-/// that is accepted leaves the pace as it is, and its state has to be put back. Also the largest sizes so far.
+/// that is accepted leaves the pace as it is, and its state has to be put back.
 #[allow(clippy::too_many_arguments, reason = "all that an attempt depends on")]
 pub(crate) fn attempt<N: Number>(
     program: &Program,
@@ -204,22 +232,23 @@ pub(crate) fn attempt<N: Number>(
     budget: N,
     v: &Block<N>,
     y: &Block<N>,
-) -> (Pace<N>, Vec<N>, Block<N>, Block<N>) {
+) -> (Pace<N>, Scales<N>, Block<N>, Block<N>) {
     let outlook = pace.outlook(budget);
     let s = (system.rates)(outlook.step);
     let mut made = program.run(s.as_ref(), pace.t, outlook.step, v, y);
     let blocks: Vec<&[N]> = made.iter().map(Block::as_slice).collect();
     let sizes = Made::of(acceptance, [v.as_slice(), y.as_slice()], &blocks);
-    let (next, longest, took) = judge(&pace, scales, order, acceptance.counts(v.len(), y.len()), &sizes, outlook);
+    let sizes = Made { has_mass: s.mass().is_some(), ..sizes };
+    let (next, scales, took) = judge(&pace, scales, order, acceptance.counts(v.len(), y.len()), &sizes, outlook);
     made.truncate(2);
-    let (Some(new_y), Some(new_v)) = (made.pop(), made.pop()) else { return (next, longest, v.clone(), y.clone()) };
+    let (Some(new_y), Some(new_v)) = (made.pop(), made.pop()) else { return (next, scales, v.clone(), y.clone()) };
     let (new_v, new_y) = system.projected.project(new_v, new_y);
     let pushed = s.tally().map(|tally| tally / outlook.step);
     let next = match pushed.or(system.projected.tally()) {
         Some(done) => Pace { work: N::choose(took & !outlook.is_extra, pace.work + done, pace.work), ..next },
         None => next,
     };
-    (next, longest, taken(took, &new_v, v), taken(took, &new_y, y))
+    (next, scales, taken(took, &new_v, v), taken(took, &new_y, y))
 }
 
 /// The new block if the state goes on, else the old one.
@@ -227,8 +256,7 @@ pub(crate) fn taken<N: Number>(took: N::Truth, new: &Block<N>, old: &Block<N>) -
     new.zip_map(old, |new, old| N::choose(took, new, old))
 }
 
-/// What comes after an attempt, the largest sizes so far, and whether the state goes on. `counts` are how many groups v and y
-/// have.
+/// What comes after an attempt, and whether the state goes on. `counts` are how many groups v and y have.
 pub(crate) fn judge<N: Number>(
     pace: &Pace<N>,
     scales: &Scales<N>,
@@ -236,13 +264,19 @@ pub(crate) fn judge<N: Number>(
     counts: [usize; 2],
     made: &Made<N>,
     outlook: Outlook<N>,
-) -> (Pace<N>, Vec<N>, N::Truth) {
+) -> (Pace<N>, Scales<N>, N::Truth) {
     let zero = N::of(0.0);
     let (least, bound) = pace.tolerated(scales, outlook.step, counts, made);
-    let mut r = made.errors.first().map_or(zero, |error| over(error, &bound));
+    let error = made.errors.first().map_or(&[][..], Vec::as_slice);
+    let rounded = pace.rounded(scales, outlook.step);
+    let is_rounding: Vec<N::Truth> =
+        error.iter().zip(&rounded).map(|(e, rounded)| zero.below(*rounded) & e.at_most(*rounded)).collect();
+    let beyond = |errors: &[N]| -> Vec<N> { errors.iter().zip(&is_rounding).map(|(e, is)| N::choose(*is, zero, *e)).collect() };
+    let mut r = over(&beyond(error), &bound);
     if let Some(coarse) = made.errors.get(1) {
-        let size: Vec<N> = scales.longest.iter().zip(&made.new).map(|(so_far, new)| longer(*so_far, *new)).collect();
-        let (second, share) = (over(coarse, &bound), over(coarse, &size));
+        let size: Vec<N> = made.old.iter().zip(&made.new).map(|(old, new)| longer(*old, *new)).collect();
+        let coarse = beyond(coarse);
+        let (second, share) = (over(&coarse, &bound), over(&coarse, &size));
         let other = second / r;
         let by_chance = N::of(CHANCE).below(other) & N::of(WILD).below(share);
         if order > LOW {
@@ -254,15 +288,15 @@ pub(crate) fn judge<N: Number>(
         r = N::choose(by_chance, second, r);
     }
     // Sizes that overflow would tolerate any error, so they count as not finite; and so does a stage that only the estimate sees.
-    let all = made.errors.first().map_or(total(&made.new), |error| total(&made.new) + total(error));
+    let all = total(&made.new) + total(error);
     r = N::choose(all.below(N::of(f64::INFINITY)), r, N::of(f64::INFINITY));
     for number in &made.positive {
         r = N::choose(number.below(zero), longer(r, N::of(OUTSIDE)), r);
     }
-    let changes: Vec<N> = made.new.iter().zip(&made.old).map(|(new, old)| absolute(*new - *old)).collect();
-    let moved = made.errors.first().map_or(total(&changes), |error| total(error) + total(&changes));
-    let rests = moved.at_most(zero);
-    pace.decided(order > LOW, (r, rests), (&scales.longest, &least), outlook)
+    let rests = (total(error) + total(&made.moved)).at_most(zero);
+    let (next, longest, took) = pace.decided(order > LOW, (r, rests), (&scales.longest, &least), outlook);
+    let (noise, failed) = pace.heard(&next, scales, outlook.step, (error, &bound), made);
+    (next, Scales { longest, noise, failed, ..scales.clone() }, took)
 }
 
 /// The largest error of a group over what is tolerated. A group that is zero, as it has always been, tolerates no error and has
@@ -287,14 +321,14 @@ impl<N: Number> Pace<N> {
         for block in [0..of_v, of_v..of_v + counts[1]] {
             let (longest, after) = (&scales.longest[block.clone()], &new[block]);
             if let ([size], [now]) = (longest, after) {
-                lasting.push(N::choose(rested, *now * since, *size));
+                lasting.push(N::choose(rested, *now * since, N::of(LEAST_PART) * *size));
                 least.push(*now);
             } else if !after.is_empty() {
                 let onset = N::of(ONSET) * longer(largest(longest), largest(after));
                 for (size, now) in longest.iter().zip(after) {
                     let been = zero.below(*size);
-                    lasting.push(N::choose(been, *size, N::choose(rested, *now * since, onset)));
-                    least.push(N::choose(been | rested, *now, longer(*now, onset)));
+                    lasting.push(N::choose(been, N::of(LEAST_PART) * *size, N::choose(rested, *now * since, onset)));
+                    least.push(N::choose(been | rested | onset.below(*now), *now, zero));
                 }
             }
         }
@@ -305,12 +339,57 @@ impl<N: Number> Pace<N> {
             }
         }
         let bound = |group: usize| {
-            let size = longer(N::choose(zero.below(self.lasts), lasting[group], old[group]), new[group]);
+            let size = longer(longer(N::choose(zero.below(self.lasts), lasting[group], zero), old[group]), new[group]);
             let [relative, absolute] = scales.tolerances(group, self);
             absolute + relative * size
         };
         let bound = (0..new.len()).map(bound).collect();
         (least, bound)
+    }
+
+    /// Of each group the error that is rounding.
+    fn rounded(&self, scales: &Scales<N>, step: N) -> Vec<N> {
+        let of_group = |(group, noise): (usize, &N)| {
+            let (noise, most) = (*noise * step, scales.tolerances(group, self)[0] * scales.longest[group]);
+            longer(N::choose(most.below(noise), most, noise), N::of(0.0))
+        };
+        scales.noise.iter().enumerate().map(of_group).collect()
+    }
+
+    /// What is known of rounding after an attempt: [`Scales::noise`] and [`Scales::failed`].
+    fn heard(
+        &self,
+        next: &Pace<N>,
+        scales: &Scales<N>,
+        step: N,
+        (error, bound): (&[N], &[N]),
+        made: &Made<N>,
+    ) -> (Vec<N>, Vec<N>) {
+        let zero = N::of(0.0);
+        let (takes, fails) = (self.accepted.below(next.accepted), self.rejected.below(next.rejected));
+        let (per_power, per_time, alike) = (N::of(1.0) / (step * step.sqrt()), N::of(ROUNDED) / step, N::of(ALIKE) * step);
+        let small = N::of(if made.has_mass { 1.0 } else { ROUNDINGS * made.rounding });
+        let of_group = |group: usize| {
+            let (noise, failed, error, moved) = (scales.noise[group], scales.failed[group], error[group], made.moved[group]);
+            let [relative, _] = scales.tolerances(group, self);
+            let most = relative * scales.longest[group];
+            let offends = bound[group].below(error) & error.at_most(most) & zero.below(self.lasts);
+            let share = error * per_power;
+            let is_small = error.at_most(small * scales.longest[group]);
+            let is_slow = moved.at_most(N::of(SLOW) * relative.sqrt().sqrt() * made.old[group]);
+            let is_pushed = (N::of(PUSHES) * made.old[group]).below(moved);
+            let falls_slowly = zero.below(failed) & failed.at_most(share) & ((is_slow & is_small) | is_pushed);
+            let is_rounding = falls_slowly | (error.at_most(alike * noise) & is_small);
+            let next_failed = N::choose(moved.at_most(N::of(UNLIKE) * error), failed, zero);
+            let next_noise = N::choose(is_rounding, error * per_time, N::of(FADES) * noise);
+            let holds_down = N::of(HOLDS_DOWN) * bound[group];
+            let stands = (N::of(UNLIKE) * moved).at_most(error) & holds_down.below(error) & zero.below(self.lasts);
+            let taken = N::choose(stands, error * per_time, N::of(FADES) * noise);
+            let offends = fails & offends;
+            let next_noise = N::choose(offends, next_noise, N::choose(takes, taken, noise));
+            (next_noise, N::choose(offends, longer(share, failed), N::choose(takes, next_failed, failed)))
+        };
+        (0..error.len()).map(of_group).unzip()
     }
 
     /// What comes after an attempt with this error, the largest sizes so far, and whether the state goes on. `high`: the estimate

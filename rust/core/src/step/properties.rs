@@ -4,7 +4,7 @@ use super::{key::StepKind, solving};
 use crate::{
     error::Error,
     model::{
-        around::{self, contact, controls},
+        around::{self, contact, controls, sampled},
         methods::method,
         program::Program,
         spec::Signature,
@@ -13,9 +13,9 @@ use crate::{
     },
 };
 
-/// The most operations of a step that is a single tape. Writing the code of one operation takes about a microsecond, and longer
-/// code would not stay in the instruction cache.
-pub(crate) const MAX_TAPE_OPERATIONS: usize = 4000;
+/// The most operations, approximately, of a step that is a single tape: tracing and writing take a microsecond each, and its code
+/// of a megabyte stays in the second cache.
+pub(crate) const MAX_TAPE_OPERATIONS: usize = 100_000;
 
 /// The size of the blocks of a scene, or an error if its parameters are wrong or the method cannot step it.
 pub(crate) fn shape(signature: &Signature, how: &StepKind) -> Result<Shape, Error> {
@@ -37,6 +37,7 @@ fn quantity(signature: &Signature, name: &str) -> Result<usize, Error> {
     let found = known.iter().find(|(known, _)| *known == name);
     found
         .map(|(_, numbers)| *numbers)
+        .or_else(|| sampled::sets(signature, name))
         .ok_or_else(|| Error::Options { system: signature.system.clone(), options: format!("record {name}") })
 }
 
@@ -84,7 +85,7 @@ pub(super) fn operations(signature: &Signature, how: &StepKind, shape: Shape) ->
                 let n = if shape.v == shape.y { shape.v } else { shape.v + shape.y };
                 equations = rates * n;
                 solving = 4 * n * n * n / 3 + 3 * n * n * program.solutions();
-                if equations + solving > MAX_IMPLICIT_TAPE_OPERATIONS && rates <= MAX_LONG_TAPE_OPERATIONS {
+                if equations + solving > MAX_IMPLICIT_TAPE_OPERATIONS && rates <= MAX_TAPE_OPERATIONS {
                     (equations, solving) = solving::operations(signature, program, shape)?;
                 }
                 solving += equations;
@@ -123,14 +124,12 @@ fn of_method(how: &StepKind, holds: impl Fn(&Program) -> bool) -> Result<bool, E
     })
 }
 
-/// The most operations, approximately, of a step that is one tape in any case: by a series, one that is given, one that is fused,
-/// or one of members that have times of their own. It takes some ten nanoseconds a byte to compile.
-pub(super) const MAX_LONG_TAPE_OPERATIONS: usize = 100_000;
-
-/// The same of a step that solves equations, or of these equations alone: to trace and compile so many takes some three seconds.
+/// The most operations of a step that solves equations, or of these equations alone: to trace and compile so many takes some three
+/// seconds.
 pub(super) const MAX_IMPLICIT_OPERATIONS: usize = 500_000;
 
-/// The most operations of a step that solves equations and is one tape though it might be solved over rows.
+/// The most operations of a step that solves equations and is one tape, for however few steps, though it might be solved over
+/// rows.
 pub(super) const MAX_IMPLICIT_TAPE_OPERATIONS: usize = 20_000;
 
 /// The most unknowns of equations: their matrix is kept as a whole.

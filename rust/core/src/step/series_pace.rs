@@ -6,7 +6,7 @@
 //! rejected only if a function might leave its branch within it, if a number is not finite or if it does not move the time.
 //! `reference/series_pace.py` is the specification.
 
-use super::pace::{Acceptance, MAX_FACTOR, ONSET, Pace, ROUNDING, Scales, largest, longer, over, total};
+use super::pace::{Acceptance, LEAST_PART, MAX_FACTOR, ONSET, Pace, ROUNDING, Scales, largest, longer, over, total};
 use crate::{
     functions::{rough_exp2, rough_log2},
     model::{
@@ -55,8 +55,7 @@ pub(crate) fn terms<N: Number>(
     coefficients(system, order, [pace.t, unit, unit], v, y)
 }
 
-/// One step by these coefficients, or one extra step, which leaves the pace as it is and whose state has to be put back. Also the
-/// largest sizes so far. `rates` are those of a step of 1, by which the end of a step is checked; a step that is made once more
+/// One step by these coefficients, or one extra step, which leaves the pace as it is and whose state has to be put back. `rates` are those of a step of 1, by which the end of a step is checked; a step that is made once more
 /// needs neither them nor branches.
 #[allow(clippy::too_many_arguments, reason = "all that an attempt depends on")]
 pub(crate) fn attempt<N: Number>(
@@ -68,7 +67,7 @@ pub(crate) fn attempt<N: Number>(
     budget: N,
     v: &Block<N>,
     y: &Block<N>,
-) -> (Pace<N>, Vec<N>, Block<N>, Block<N>) {
+) -> (Pace<N>, Scales<N>, Block<N>, Block<N>) {
     let outlook = pace.outlook(budget);
     let unit = unit_of(pace.before);
     let Reach { far, moved, allowed } = reach(acceptance, (&pace, scales), unit, [v, y], terms);
@@ -77,7 +76,10 @@ pub(crate) fn attempt<N: Number>(
     let step = N::choose(ends, bound, far);
     let length = N::choose(outlook.is_extra, pace.extra, step);
     let share = length * (N::of(1.0) / unit);
-    let (new_v, new_y) = (value(v, terms.iter().map(|term| &term.0), share), value(y, terms.iter().map(|term| &term.1), share));
+    let low = |i: usize| scales.low.get(i).copied().unwrap_or(N::of(0.0));
+    let (from_v, from_y) = (Block::from_fn(v.len(), |i, _| low(i)), Block::from_fn(y.len(), |i, _| low(v.len() + i)));
+    let (new_v, low_v) = compensated(v, &value(&from_v, terms.iter().map(|term| &term.0), share));
+    let (new_y, low_y) = compensated(y, &value(&from_y, terms.iter().map(|term| &term.1), share));
     let new = acceptance.sizes(new_v.as_slice(), new_y.as_slice());
     let agrees = rates.and_then(|s| {
         let slope = |of: &dyn Fn(&Term<N>) -> Block<N>| {
@@ -104,7 +106,9 @@ pub(crate) fn attempt<N: Number>(
         None => next,
     };
     let goes_on = |new: &Block<N>, old: &Block<N>| new.zip_map(old, |new, old| N::choose(took, new, old));
-    (next, longest, goes_on(&new_v, v), goes_on(&new_y, y))
+    let low = low_v.iter().chain(low_y.iter()).zip(&scales.low);
+    let low = low.map(|(new, old)| N::choose(took & !outlook.is_extra, *new, *old)).collect();
+    (next, Scales { longest, low, ..scales.clone() }, goes_on(&new_v, v), goes_on(&new_y, y))
 }
 
 /// The unit of time of the coefficients, the power of two at or below a step: they overflow in no unit of the user's.
@@ -126,11 +130,35 @@ fn value<'a, N: Number + 'a>(start: &Block<N>, terms: impl Iterator<Item = &'a B
     start.zip_map(&rest, |start, rest| start + share * rest)
 }
 
+/// The sum of both, and what its rounding leaves out, exactly (Møller 1965; Knuth 1969).
+fn compensated<N: Number>(start: &Block<N>, change: &Block<N>) -> (Block<N>, Block<N>) {
+    let end = start.zip_map(change, |start, change| start + change);
+    let added = end.zip_map(start, |end, start| end - start);
+    let of_start = end.zip_map(&added, |end, added| end - added);
+    let of_start = start.zip_map(&of_start, |start, of_start| start - of_start);
+    let of_change = change.zip_map(&added, |change, added| change - added);
+    let low = of_start.zip_map(&of_change, |a, b| a + b);
+    (end, low)
+}
+
+/// How many units of time a part of a step is, whose coefficients were found after a step of this length.
+pub(crate) fn share_of(length: f64, before: f64) -> f64 {
+    length * (1.0 / f64::from_bits(before.to_bits() & EXPONENT))
+}
+
+/// The new state of one number as an attempt makes it, of that many coefficients; `low` is what rounding left out before.
+pub(crate) fn sum((start, low): (f64, f64), term: impl Fn(usize) -> f64, order: usize, share: f64) -> f64 {
+    let square = share * share;
+    let sum = |first: usize| (first..order).step_by(2).rev().map(&term).reduce(|sum, term| term + square * sum);
+    let (Some(odd), Some(even)) = (sum(0), sum(1)) else { return start + low };
+    start + (low + share * (odd + share * even))
+}
+
 /// What [`reach`] finds.
 struct Reach<N> {
     /// How far the series is as good as is tolerated.
     far: N,
-    /// The motion in one unit of time over the tolerated error.
+    /// The motion in one unit of time over the tolerated error of the largest sizes so far.
     moved: N,
     /// What a step may err: of each group the defect times the step, that is by how much the series and the rates at its end
     /// differ. It is p + 1 times the first term that is left out.
@@ -159,25 +187,28 @@ fn reach<N: Number>(
         let (longest, now) = (&scales.longest[block.clone()], &present[block]);
         if now.len() > 1 {
             let onset = N::of(ONSET) * longer(largest(longest), largest(now));
-            standing.extend(longest.iter().map(|size| N::choose(zero.below(*size), *size, onset)));
+            standing.extend(longest.iter().map(|size| N::choose(zero.below(*size), number(LEAST_PART) * *size, onset)));
         } else {
-            standing.extend(longest);
+            standing.extend(longest.iter().map(|size| number(LEAST_PART) * *size));
         }
     }
     let before = pace.before * (number(1.0) / unit);
     let groups = 0..present.len();
     let counts_as = |group: usize| {
-        let counts = N::choose(zero.below(pace.lasts), standing[group], present[group]);
+        let counts = longer(N::choose(zero.below(pace.lasts), standing[group], zero), present[group]);
         longer(counts, first[group] * before)
     };
-    let counts_as: Vec<N> = groups.clone().map(counts_as).collect();
+    let counts_as: Vec<N> = groups.map(counts_as).collect();
     // What begins at zero, where nothing else has been, tolerates no error: it does not count.
-    let bound = |group: usize| {
-        let [relative, absolute] = scales.tolerances(group, pace);
-        let tolerated = absolute + relative * counts_as[group];
-        N::choose(zero.below(tolerated), tolerated, number(f64::INFINITY))
+    let bound_of = |sizes: &[N]| {
+        let of_group = |(group, size): (usize, &N)| {
+            let [relative, absolute] = scales.tolerances(group, pace);
+            let tolerated = absolute + relative * *size;
+            N::choose(zero.below(tolerated), tolerated, number(f64::INFINITY))
+        };
+        sizes.iter().enumerate().map(of_group).collect::<Vec<N>>()
     };
-    let bound: Vec<N> = groups.map(bound).collect();
+    let bound = bound_of(&counts_as);
     // A size that is not a number counts as the largest: which bits NaN has, its logarithm would show.
     let logarithm = |size: N| {
         let [least, most] = BOUNDS.map(number);
@@ -201,7 +232,14 @@ fn reach<N: Number>(
     let far = rough_exp2(N::choose(by_radius.below(by_error), by_radius, by_error)) * unit;
     let limited = N::choose(number(1.0).below(pace.most), pace.most, number(1.0));
     let most = N::choose(pace.most.below(number(MAX_FACTOR)), limited, number(MAX_GROWTH)) * pace.before;
-    let allowed = bound.iter().zip(&lost).map(|(bound, lost)| number(DEFECT * (p + 1.0)) * (*bound + *lost)).collect();
+    // A defect may be rounding of rates that are differences of larger numbers, and a branch may end at zero, so both are compared
+    // with the largest sizes so far.
+    let so_far = scales.longest.iter().zip(&counts_as);
+    let so_far: Vec<N> = so_far.map(|(size, now)| longer(N::choose(zero.below(pace.lasts), *size, zero), *now)).collect();
+    let allowed = |(bound, size): (N, &N)| number(DEFECT * (p + 1.0)) * (bound + number(ROUNDING) * *size);
+    let bound = bound_of(&so_far);
+    let moved = over(&first, &bound);
+    let allowed = bound.into_iter().zip(&so_far).map(allowed).collect();
     Reach { far: pace.shortened(N::choose(most.below(far), most, far), pace.t), moved, allowed }
 }
 

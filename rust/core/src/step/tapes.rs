@@ -11,8 +11,8 @@ use super::{
     key::{StepKind, TapeKey},
     leaves::own_times,
     properties::{
-        MAX_IMPLICIT_OPERATIONS, MAX_IMPLICIT_TAPE_OPERATIONS, MAX_LONG_TAPE_OPERATIONS, MAX_TAPE_OPERATIONS, MAX_UNKNOWNS,
-        Operations, has_derivatives, has_series, has_splitting, operations, recorded, shape,
+        MAX_IMPLICIT_OPERATIONS, MAX_IMPLICIT_TAPE_OPERATIONS, MAX_TAPE_OPERATIONS, MAX_UNKNOWNS, Operations, has_derivatives,
+        has_series, has_splitting, operations, recorded, shape,
     },
     trace::{trace_begin, trace_by_terms, trace_judged, trace_record, trace_slot, trace_step},
     watch,
@@ -39,6 +39,8 @@ pub struct Tapes<T: Real = f64> {
     /// The same attempt by coefficients that are known, behind the state: saved states, and a held step when it is taken. Not
     /// where operations are fused, for the attempt may fuse what made the coefficients.
     pub by_terms: Option<Stage<T>>,
+    /// Whether a saved state within such an attempt is the sum of the series alone.
+    pub sums: bool,
     /// The second part of an attempt of float32, which is of float64, and where the rows of both parts are; `step` is the first.
     pub(crate) judged: Option<(Stage, TriedRows)>,
     /// Of attempts: the pace behind the state, as it is at the start: see `Pace::begun`. Its operations are never fused.
@@ -78,6 +80,8 @@ pub struct Traced {
     pub carries: bool,
     /// Whether steps are made by derivatives on one tape, however long.
     pub series: bool,
+    /// Whether equations are solved over rows, but where a tape for many steps pays.
+    pub solves_rows: bool,
     /// Approximate numbers of operations of the rates and of a step.
     pub operations: (usize, usize),
     tapes: OnceLock<Arc<Tapes>>,
@@ -94,7 +98,7 @@ impl TapeKey {
             let Operations { rates, step, equations } = operations(&self.signature, &self.how, shape)?;
             let operations = (rates, step);
             let own_times = own_times(&self.signature);
-            let mut series = has_series(&self.how)?;
+            let (mut series, mut solves_rows) = (has_series(&self.how)?, false);
             let has_mass = self.signature.equations.as_ref().is_some_and(|equations| equations.mass.is_some());
             if !series && has_derivatives(&self.how)? {
                 let is_one = self.fused
@@ -103,26 +107,27 @@ impl TapeKey {
                     || around::is_one_tape(&self.signature)
                     || has_mass;
                 series = is_one || step <= MAX_IMPLICIT_TAPE_OPERATIONS;
+                solves_rows = !series;
                 let long = if series { step } else { equations };
                 let unknowns = shape.v + shape.y;
                 if long > MAX_IMPLICIT_OPERATIONS || unknowns > MAX_UNKNOWNS {
                     let (most, most_unknowns) = (MAX_IMPLICIT_OPERATIONS, MAX_UNKNOWNS);
                     return Err(Error::TooLongToSolve { operations: long, most, unknowns, most_unknowns });
                 }
-            } else if series && operations.1 > MAX_LONG_TAPE_OPERATIONS {
-                return Err(Error::TooLongForSeries { operations: operations.1, most: MAX_LONG_TAPE_OPERATIONS });
+            } else if series && operations.1 > MAX_TAPE_OPERATIONS {
+                return Err(Error::TooLongForSeries { operations: operations.1, most: MAX_TAPE_OPERATIONS });
             }
             if !series && has_splitting(&self.signature, &self.how)? {
                 series = true;
-                if operations.1 > MAX_LONG_TAPE_OPERATIONS {
-                    return Err(Error::TooLongToSplit { operations: operations.1, most: MAX_LONG_TAPE_OPERATIONS });
+                if operations.1 > MAX_TAPE_OPERATIONS {
+                    return Err(Error::TooLongToSplit { operations: operations.1, most: MAX_TAPE_OPERATIONS });
                 }
             }
-            if self.fused && !series && operations.1 > MAX_LONG_TAPE_OPERATIONS {
-                return Err(Error::TooLongToFuse { operations: operations.1, most: MAX_LONG_TAPE_OPERATIONS });
+            if self.fused && !series && operations.1 > MAX_TAPE_OPERATIONS {
+                return Err(Error::TooLongToFuse { operations: operations.1, most: MAX_TAPE_OPERATIONS });
             }
-            if own_times && operations.1 > MAX_LONG_TAPE_OPERATIONS {
-                return Err(Error::TooLongForTimes { operations: operations.1, most: MAX_LONG_TAPE_OPERATIONS });
+            if own_times && operations.1 > MAX_TAPE_OPERATIONS {
+                return Err(Error::TooLongForTimes { operations: operations.1, most: MAX_TAPE_OPERATIONS });
             }
             if self.precision == Precision::Single {
                 self.fits_single(operations.1)?;
@@ -148,6 +153,7 @@ impl TapeKey {
                 tally,
                 carries,
                 series,
+                solves_rows,
                 recorded: recorded(&self.signature, &self.record)?,
                 operations,
                 tapes: OnceLock::new(),
@@ -155,11 +161,14 @@ impl TapeKey {
                 key: self.clone(),
             };
             let is_one = series || own_times || self.fused || matches!(self.how, StepKind::Step(_));
-            let most = if is_one { MAX_LONG_TAPE_OPERATIONS } else { 4 * MAX_TAPE_OPERATIONS };
-            Ok((traced, operations.1.min(most)))
+            let is_in_parts = !is_one && operations.1 > MAX_TAPE_OPERATIONS;
+            Ok((traced, if is_in_parts { SIZE_IN_PARTS } else { operations.1.min(MAX_TAPE_OPERATIONS) }))
         })
     }
 }
+
+/// For so many operations counts what is known of a step that is not one tape.
+const SIZE_IN_PARTS: usize = 16_000;
 
 /// Operations of a step from which on it may take so long that Ctrl-C must be answered within it.
 const LONG_STEP_OPERATIONS: usize = 1 << 24;
@@ -262,12 +271,10 @@ impl TapeKey {
         }
         let written = steps.tape.written(steps.next.iter().copied());
         let series_evaluations = steps.tape.series_evaluations();
-        let (mut next, mut by_terms) = (steps.next, None);
+        let (mut next, mut by_terms, mut sums) = (steps.next, None, false);
         if !steps.terms.is_empty() && !self.fused {
-            by_terms = Some(Stage::cut(
-                &self.signature,
-                &trace_by_terms(new(), &self.signature, &self.how, steps.shape, steps.terms.len())?,
-            ));
+            let (tape, by, projects) = trace_by_terms(new(), &self.signature, &self.how, steps.shape, steps.terms.len())?;
+            (by_terms, sums) = (Some(Stage::cut(&self.signature, &(tape, by))), !projects);
             next.extend(steps.terms);
         }
         let step = fused(steps.tape, next);
@@ -283,6 +290,7 @@ impl TapeKey {
         Ok(Tapes {
             step,
             by_terms,
+            sums,
             judged,
             begin,
             start,

@@ -113,7 +113,7 @@ fn step(kind: &Kind, signature: &Signature, shape: Shape, method: &Method, choic
     next.extend(remembered.into_iter().map(|symbol| symbol.0));
     next.extend(s.tally().map(|tally| tally.0));
     let first = next.len();
-    next.extend(watch::next(kind, &p, method, choice, t, [&v0, &y0], first));
+    next.extend(watch::next(&p, t, [&v, &y], first));
     next
 }
 
@@ -154,17 +154,19 @@ pub(super) fn trace_begin(tape: Tape, signature: &Signature, how: &StepKind) -> 
     Ok(record(tape, || attempts.begin(series)))
 }
 
-/// Traces an attempt by coefficients that stand behind the rest of the state, where they stay.
+/// Traces an attempt by coefficients that stand behind the rest of the state, where they stay; and whether what they sum up to is
+/// projected.
 pub(super) fn trace_by_terms(
     tape: Tape,
     signature: &Signature,
     how: &StepKind,
     shape: Shape,
     numbers: usize,
-) -> Result<(Tape, Vec<Id>), Error> {
+) -> Result<(Tape, Vec<Id>, bool), Error> {
     let StepKind::Attempts { acceptance, backward, .. } = how else { return Err(Error::NoEstimate) };
     let attempts = AttemptsOf { kind: kind(signature)?, signature, shape, acceptance, backward: *backward };
-    Ok(record(tape, || {
+    let (_, projects) = record(Tape::default(), || attempts.projects());
+    let (tape, next) = record(tape, || {
         let state = shape.v + shape.y;
         let first = state + Pace::<Symbol>::NUMBERS + acceptance.numbers(shape.v, shape.y);
         let of = |k: usize| (block(first + k * state, shape.v), block(first + k * state + shape.v, shape.y));
@@ -172,7 +174,8 @@ pub(super) fn trace_by_terms(
         let mut next = attempts.attempt_by((&terms, &[]), None);
         next.extend(block(first, numbers).iter().map(|symbol| symbol.0));
         next
-    }))
+    });
+    Ok((tape, next, projects))
 }
 
 /// s ← P·s + Σ Q·u; the sums run over s, then over the nodes and their inputs.
@@ -233,17 +236,21 @@ pub(super) fn trace_slot(
     }))
 }
 
-/// Traces the recorded quantities of a state onto a tape: a number behind v and y for each.
+/// Traces the recorded quantities of a state onto a tape: a number for each, behind v, y and what a sampled controller remembers.
 pub(crate) fn trace_record(tape: Tape, signature: &Signature, names: &[String]) -> Result<(Tape, Vec<Id>), Error> {
     let kind = kind(signature)?;
     let shape = (kind.shape)(signature)?;
     recorded(signature, names)?;
     Ok(record(tape, || {
         let (v, y) = (block(0, shape.v), block(shape.v, shape.y));
-        let s = (kind.make)(&parameters(signature, length(signature)));
-        let mut next = ids([&v, &y]);
+        let memory = block(shape.v + shape.y, sampled::numbers(signature));
+        let mut p = parameters(signature, length(signature));
+        sampled::set(&mut p, &memory);
+        let s = (kind.make)(&p);
+        let mut next = ids([&v, &y, &memory]);
         for name in names {
-            next.extend(s.record(name, &v, &y).into_iter().flatten().map(|symbol| symbol.0));
+            let numbers = s.record(name, &v, &y).unwrap_or_else(|| p.numbers(name).to_vec());
+            next.extend(numbers.into_iter().map(|symbol| symbol.0));
         }
         next
     }))

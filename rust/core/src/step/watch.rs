@@ -1,18 +1,15 @@
 //! Quantities whose changes of sign are noticed while steps are made, for runs with events.
 //!
-//! A step computes them at its start, compares each with what it was at the start of the step before, and counts where it is near
-//! to zero against its change. Where and which they are is found afterwards, by repeating steps; so what is noticed here only has
-//! to be complete.
+//! A step compares each quantity after it with what it was one and two steps before, about as `may_change` of
+//! `reference/events.py` does. In which steps and which they are is found afterwards, by repeating steps; so what is noticed here
+//! only has to be complete.
 
 use crate::{
     error::Error,
     model::{
-        around,
-        methods::Method,
         spec::{Parameters, Signature},
-        system::{Block, Kind, Shape},
+        system::{Block, Shape},
         systems::equations::{self, values_of},
-        window,
     },
     tape::{
         Id, Op,
@@ -20,13 +17,13 @@ use crate::{
     },
 };
 
-/// A quantity may be at zero and back within a step where it is no further from zero than so many times its change in this one:
-/// `REACH` of `reference/events.py`.
-const REACH: f64 = 4.0;
+/// See `reference/events.py`.
+pub(crate) const REACH: f64 = 4.0;
 
-/// How many numbers of a state it takes, behind all others: the last value of each quantity, and the count.
+/// How many numbers of a state it takes, behind all others: of each quantity what it was one step before and what it is, and
+/// whether one may have changed its sign.
 pub(crate) fn numbers(signature: &Signature) -> usize {
-    signature.watched.as_ref().map_or(0, |watched| watched.quantities().len() + 1)
+    signature.watched.as_ref().map_or(0, |watched| 2 * watched.quantities().len() + 1)
 }
 
 /// An error if the quantities read what is not given.
@@ -34,38 +31,26 @@ pub(crate) fn check(signature: &Signature, shape: Shape) -> Result<(), Error> {
     signature.watched.as_ref().map_or(Ok(()), |watched| equations::check(watched, signature, shape.v + shape.y))
 }
 
-/// The next of these numbers, of which the first is number `first` of the state; after a step from this state of the slots.
-///
-/// They begin with 0, which has no sign: the first step notices nothing. NaN has no sign either.
-pub(crate) fn next(
-    kind: &Kind,
-    p: &Parameters<Symbol>,
-    method: &Method,
-    choice: usize,
-    t: Symbol,
-    [v, y]: [&Block<Symbol>; 2],
-    first: usize,
-) -> Vec<Id> {
+/// The next of these numbers, of which the first is number `first` of the state, after a step to this state. Quantities depend on
+/// the state alone.
+pub(crate) fn next(p: &Parameters<Symbol>, t: Symbol, [v, y]: [&Block<Symbol>; 2], first: usize) -> Vec<Id> {
     let Some(watched) = &p.signature.watched else { return Vec::new() };
-    let v = match method.finish(choice) {
-        None => v.clone(),
-        Some(program) => {
-            let made = || program.run(around::wrap_for_carry(p, (kind.make)(p)).as_ref(), t, p.h, v, y).into_iter().next();
-            window::over(p.signature, || window::of_slot(t, p.h), made).unwrap_or_else(|| v.clone())
-        }
-    };
-    let now = values_of(watched, p, t, &v, y);
+    let now = values_of(watched, p, t, v, y);
     let state = |i: usize| Symbol::new(Op::State((first + i) as u32));
-    let zero = Symbol::of(0.0);
-    let mut count = state(now.len());
-    let reach = Symbol::of(REACH * REACH);
-    for (i, now) in now.iter().enumerate() {
-        let before = state(i);
-        let (change, square, last) = (*now - before, *now * *now, before * before);
-        let far = reach * (change * change);
-        // A change of sign is a longer way than from zero to either of them, so that it is among these.
-        let near = zero.below(last) & (square.at_most(far) | last.at_most(far));
-        count = Symbol::choose(near, count + Symbol::of(1.0), count);
+    let mut clear = None;
+    let mut next = Vec::new();
+    for (i, now) in now.into_iter().enumerate() {
+        let (before, last) = (state(2 * i), state(2 * i + 1));
+        let change = now - last;
+        let bend = Symbol::of(REACH) * (change - (last - before));
+        // Where the sign changes, the change is longer than both. Squares are quicker than sizes, and what is too small for them
+        // counts as zero, so that more is noticed rather than less. NaN is not clear.
+        let far = bend * bend + change * change;
+        let is_clear = far.below(now * now) & far.below(last * last);
+        clear = Some(clear.map_or(is_clear, |clear| clear & is_clear));
+        next.extend([last, now]);
     }
-    now.into_iter().chain([count]).map(|symbol| symbol.0).collect()
+    let may = state(next.len());
+    next.extend(clear.map(|clear| Symbol::choose(clear, may, Symbol::of(1.0))));
+    next.into_iter().map(|symbol| symbol.0).collect()
 }

@@ -57,9 +57,18 @@ impl Friction {
     }
 }
 
-/// A value that is a function of others: pairs of a value and the derivative by it; and, if it is one branch of several, the bits
-/// of its bounds.
-pub(crate) type Marked = (Id, Vec<(Id, Id)>, Option<[u64; 2]>);
+/// A value that is a function of others.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+pub struct Marked {
+    /// The value.
+    pub value: Id,
+    /// Pairs of a value that it is a function of and the derivative by it.
+    pub by: Vec<(Id, Id)>,
+    /// If it is one branch of several, the bits of its bounds.
+    pub bounds: Option<[u64; 2]>,
+    /// Whether it is made of pieces, as |x| and ⌊x⌋ are.
+    pub pieces: bool,
+}
 
 /// The rates of a system, as operations.
 #[derive(Clone, Debug)]
@@ -158,9 +167,10 @@ impl Equations {
             square: at(kept.square),
         });
         let quantities = self.quantities.into_iter().map(|(name, id)| (name, at(id))).collect();
-        let functions = self.functions.into_iter().filter(|(value, ..)| needed[*value as usize]);
-        let functions = functions
-            .map(|(value, by, bounds)| (at(value), by.into_iter().map(|(of, factor)| (at(of), at(factor))).collect(), bounds));
+        let functions = self.functions.into_iter().filter(|each| needed[each.value as usize]).map(|each| {
+            let by = each.by.iter().map(|(of, factor)| (at(*of), at(*factor))).collect();
+            Marked { value: at(each.value), by, ..each }
+        });
         let functions = functions.collect();
         let friction = self.friction.map(|friction| Friction {
             limit: all(friction.limit),
@@ -218,7 +228,7 @@ impl Equations {
     /// Whether the rates are made of pieces, one of which is chosen by the state or the time. What is within a function does not
     /// count.
     pub fn chooses(&self) -> bool {
-        let functions: HashMap<Id, &Vec<(Id, Id)>> = self.functions.iter().map(|(value, by, _)| (*value, by)).collect();
+        let functions: HashMap<Id, &Marked> = self.functions.iter().map(|each| (each.value, each)).collect();
         let mut varies: Vec<bool> = Vec::with_capacity(self.ops.len());
         for op in &self.ops {
             let (operands, n) = op.operands();
@@ -233,8 +243,9 @@ impl Equations {
             let op = self.ops[id as usize];
             let (operands, n) = op.operands();
             match functions.get(&id) {
-                Some(by) if by.is_empty() => return true, // as floor and sign, whose derivative is zero between jumps
-                Some(by) => open.extend(by.iter().flat_map(|(of, factor)| [*of, *factor])),
+                Some(function) if function.pieces => return true,
+                // What its derivatives choose at the end of its domain is no piece of the rates.
+                Some(function) => open.extend(function.by.iter().map(|(of, _)| *of)),
                 None if matches!(op, Op::Select(truth, ..) if varies[truth as usize]) => return true,
                 None if rounds_or_works_on_bits(op) => return true,
                 None => open.extend(&operands[..n]),
@@ -267,8 +278,8 @@ impl Equations {
         let mut needed = self.needed(&roots);
         loop {
             let known = roots.len();
-            for (_, by, _) in self.functions.iter().filter(|(value, ..)| needed[*value as usize]) {
-                roots.extend(by.iter().flat_map(|(of, factor)| [*of, *factor]).filter(|id| !needed[*id as usize]));
+            for each in self.functions.iter().filter(|each| needed[each.value as usize]) {
+                roots.extend(each.by.iter().flat_map(|(of, factor)| [*of, *factor]).filter(|id| !needed[*id as usize]));
             }
             if roots.len() == known {
                 return needed;

@@ -2,7 +2,7 @@
 
 use std::{
     collections::HashMap,
-    hash::{BuildHasherDefault, Hasher},
+    hash::{BuildHasherDefault, Hash, Hasher},
 };
 
 /// A map with a fast hash.
@@ -39,5 +39,28 @@ impl Hasher for FastHasher {
 
     fn finish(&self) -> u64 {
         self.0.rotate_left(26)
+    }
+}
+
+/// Things in the order of their first request, each once.
+#[derive(Clone, Debug)]
+pub(crate) struct Places<T> {
+    pub list: Vec<T>,
+    known: FastHashMap<T, u32>,
+}
+
+impl<T> Default for Places<T> {
+    fn default() -> Self {
+        Places { list: Vec::new(), known: FastHashMap::default() }
+    }
+}
+
+impl<T: Copy + Eq + Hash> Places<T> {
+    /// The place of a thing, which is given the next one if it has none.
+    pub(crate) fn of(&mut self, what: T) -> u32 {
+        *self.known.entry(what).or_insert_with(|| {
+            self.list.push(what);
+            self.list.len() as u32 - 1
+        })
     }
 }

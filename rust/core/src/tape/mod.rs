@@ -8,7 +8,7 @@
 
 pub mod equations;
 pub mod eval;
-mod fast_hash;
+pub(crate) mod fast_hash;
 mod forms;
 mod forms_table;
 pub mod fuse;

@@ -5,9 +5,12 @@
 //! share). So the tape is cut into four [`Body`]s, each a list of operations over rows of lanes. Only the
 //! last of them is in the hot loop.
 
-use std::hash::Hash;
-
-use super::{Id, Op, Tape, fast_hash::FastHashMap, real::Precision, reserved::WINDOW_ENDS};
+use super::{
+    Id, Op, Tape,
+    fast_hash::{FastHashMap, Places},
+    real::Precision,
+    reserved::WINDOW_ENDS,
+};
 
 /// Operations over lanes: the input of the interpreter and of a kernel writer.
 ///
@@ -70,6 +73,18 @@ impl Body {
             });
         }
         body.next = roots.iter().map(|root| place[*root as usize]).collect();
+        body
+    }
+
+    /// Values as the next state, of numbers that all are rows: first `states` ones of the state, then parameters.
+    pub(crate) fn of_values(tape: &Tape, values: &[Id], states: u32) -> Body {
+        let mut body = Body::of(tape, values, &mut |id| match tape.op(id) {
+            Op::State(i) => Some(Op::Row(i)),
+            Op::Param(i) => Some(Op::Row(states + i)),
+            _ => None,
+        });
+        body.copy_what_is_shared();
+        body.count_leaves();
         body
     }
 
@@ -353,27 +368,6 @@ pub(crate) fn split_with_times(tape: &Tape, next: &[Id], uniform: IsShared, comm
     split.sources = sources.list;
     split.params = params.list;
     split
-}
-
-/// Things in the order of their first request, each once.
-struct Places<T> {
-    list: Vec<T>,
-    known: FastHashMap<T, u32>,
-}
-
-impl<T> Default for Places<T> {
-    fn default() -> Self {
-        Places { list: Vec::new(), known: FastHashMap::default() }
-    }
-}
-
-impl<T: Copy + Eq + Hash> Places<T> {
-    fn of(&mut self, what: T) -> u32 {
-        *self.known.entry(what).or_insert_with(|| {
-            self.list.push(what);
-            self.list.len() as u32 - 1
-        })
-    }
 }
 
 /// A property of an input that is known for a run but not when a step is traced, as a leaf of a tape that is being cut.

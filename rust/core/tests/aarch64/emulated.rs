@@ -45,11 +45,7 @@ pub(crate) struct Case<T> {
 impl<T: Real> Case<T> {
     pub(crate) fn all(seed: u64) -> Vec<Case<T>> {
         let random = &mut Random(seed.wrapping_mul(0xD134_2543_DE82_EF95) ^ 0xA64);
-        let operations = match random.below(8) {
-            0 => 3 + random.below(6),
-            7 => 200 + random.below(300),
-            _ => 8 + random.below(80),
-        };
+        let operations = random::length(seed, random);
         let states = if random.once_in(6) { 1 + random.below(30) } else { 1 + random.below(5) };
         let body = random::body(random, operations, states);
         Case::of(seed, random, if T::PRECISION == Precision::Single { random::in_single(body) } else { body })
@@ -61,7 +57,7 @@ impl<T: Real> Case<T> {
             choose(&body, Level::Neon, random.one_of(&[1, 2, 3, 4, 9, 60, 1000])).unwrap()
         } else {
             let width = random.one_of(&[1, 16 / size_of::<T>()]);
-            Shape { bytes: size_of::<T>(), ..shape(random, Level::Neon, width) }
+            Shape { bytes: size_of::<T>(), ..shape(random, body.ops.len(), Level::Neon, width) }
         };
         let assembled = assemble(&body, shape).unwrap_or_else(|| panic!("seed {seed}: {shape:?} is not written"));
         let case = |steps| {

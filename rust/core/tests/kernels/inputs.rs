@@ -56,9 +56,10 @@ impl<T: Real> Inputs<T> {
     }
 }
 
-/// A shape of a level and a width.
-pub(crate) fn shape(random: &mut Random, level: Level, width: usize) -> Shape {
-    let block_vectors = if random.once_in(2) { 1 + random.below(2) } else { 1 + random.below(12) };
+/// A shape of a level and a width; of few vectors if there are so many operations that all take long to write.
+pub(crate) fn shape(random: &mut Random, operations: usize, level: Level, width: usize) -> Shape {
+    let most = if operations < 1000 { 12 } else { 3 };
+    let block_vectors = if random.once_in(2) { 1 + random.below(2) } else { 1 + random.below(most) };
     let blocks = if random.once_in(2) { 1 } else { 1 + random.below(5) };
     let interleaved = if random.once_in(3) { 1 + random.below(block_vectors) } else { block_vectors };
     Shape { level, bytes: 8, width, block_vectors, interleaved, blocks, resident: random.once_in(2) }

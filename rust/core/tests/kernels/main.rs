@@ -9,6 +9,8 @@ mod inputs;
 mod packed;
 mod process;
 mod random;
+#[path = "../common/ring.rs"]
+mod ring;
 mod schedule;
 
 use inputs::{Inputs, same, shape};
@@ -18,7 +20,7 @@ use stepwell_core::{
     kernel::{
         Kernel,
         interpret::Interpreter,
-        writer::{Shape, Written, choose, write},
+        writer::{Shape, Written, choose, in_local_order, write},
     },
     tape::{
         Op,
@@ -54,11 +56,7 @@ fn widths_of(precision: Precision) -> Vec<(Level, usize)> {
 /// Compares a random body in a random shape with the interpreter; returns on how many inputs.
 fn one_case<T: Real>(seed: u64, read_code: bool) -> usize {
     let random = &mut Random(seed.wrapping_mul(0xD134_2543_DE82_EF95));
-    let operations = match random.below(8) {
-        0 => 3 + random.below(6),
-        7 => 200 + random.below(300),
-        _ => 8 + random.below(80),
-    };
+    let operations = random::length(seed, random);
     let states = if random.once_in(6) { 1 + random.below(30) } else { 1 + random.below(5) };
     let body = random::body(random, operations, states);
     let body = if T::PRECISION == Precision::Single { random::in_single(body) } else { body };
@@ -67,9 +65,10 @@ fn one_case<T: Real>(seed: u64, read_code: bool) -> usize {
         let members = random.one_of(&[1, 2, 4, 5, 8, 9, 60, 1000]);
         choose(&body, level, members).unwrap()
     } else {
-        Shape { bytes: size_of::<T>(), ..shape(random, level, width) }
+        Shape { bytes: size_of::<T>(), ..shape(random, operations, level, width) }
     };
-    let kernel = write(&body, shape).unwrap_or_else(|| panic!("seed {seed}: {shape:?} is not written"));
+    let ordered = if seed.is_multiple_of(3) { in_local_order(&body, 0) } else { body.clone() };
+    let kernel = write(&ordered, shape).unwrap_or_else(|| panic!("seed {seed}: {shape:?} is not written"));
     // On other CPUs the assembly is read: see `tests/aarch64`.
     #[cfg(not(target_arch = "x86_64"))]
     let _ = read_code;

@@ -49,6 +49,16 @@ impl Random {
     }
 }
 
+/// About so many operations for the body of a seed; one body in 400 is as long as that of a system of some hundred numbers.
+pub(crate) fn length(seed: u64, random: &mut Random) -> usize {
+    match random.below(8) {
+        _ if seed % 400 == 17 => random.one_of(&[5000, 20_000, 70_000]),
+        0 => 3 + random.below(6),
+        7 => 200 + random.below(300),
+        _ => 8 + random.below(80),
+    }
+}
+
 impl Random {
     /// The same for either size of numbers: of 32 bits often any bits, or a subnormal one.
     pub(crate) fn number_of<T: Real>(&mut self) -> T {

@@ -12,12 +12,14 @@ use crate::kernel::timing::{Timing, UNITS, Unit, timing};
 const ISSUED: usize = 6;
 /// Operations under way at once.
 const WINDOW: usize = 256;
-/// Steps that are gone through, and after how many of them the count begins.
-const STEPS: usize = 6;
-const WARM: usize = 3;
+/// Steps that are gone through, and after how many of them the count begins; and the same of steps so long that hardly two of them
+/// are under way at once.
+const STEPS: [usize; 2] = [6, 3];
+const LONG_STEPS: [usize; 2] = [3, 1];
+const LONG: usize = 2 * WINDOW;
 
 /// The times of an operation; none of what is there before.
-fn time_of(make: &Make) -> Option<Timing> {
+pub(crate) fn time_of(make: &Make) -> Option<Timing> {
     let latency = match make {
         Make::State(_) | Make::Fixed(_) | Make::Now(_) => return None,
         Make::Op(op) => return Some(timing(*op)),
@@ -64,6 +66,7 @@ impl Occupied {
 /// Cycles of a step, with the units that there are (`limited`) or with as many as there are operations.
 pub(crate) fn cycles(packed: &Packed, limited: bool) -> f64 {
     let count = packed.vectors.len();
+    let [steps, warm] = if count > LONG { LONG_STEPS } else { STEPS };
     let timings: Vec<_> = packed.vectors.iter().map(|vector| time_of(&vector.make)).collect();
     let made: Vec<usize> = (0..count).filter(|at| timings[*at].is_some()).collect();
     let mut users: Vec<Vec<usize>> = vec![Vec::new(); count];
@@ -75,11 +78,11 @@ pub(crate) fn cycles(packed: &Packed, limited: bool) -> f64 {
     // What a vector is after it replaced one of the state, in the step behind; and what enters the window when it leaves that.
     let mut later: Vec<Vec<usize>> = vec![Vec::new(); count];
     packed.state.iter().for_each(|state| later[state.next as usize].push(state.old as usize));
-    let mut waits: Vec<u32> = std::iter::repeat_n(waits, STEPS).flatten().collect();
-    packed.state.iter().for_each(|state| (1..STEPS).for_each(|step| waits[step * count + state.old as usize] += 1));
-    let mut ready: Vec<u64> = vec![0; STEPS * count];
-    let order: Vec<usize> = (0..STEPS).flat_map(|step| made.iter().map(move |at| step * count + at)).collect();
-    let mut place = vec![0; STEPS * count];
+    let mut waits: Vec<u32> = std::iter::repeat_n(waits, steps).flatten().collect();
+    packed.state.iter().for_each(|state| (1..steps).for_each(|step| waits[step * count + state.old as usize] += 1));
+    let mut ready: Vec<u64> = vec![0; steps * count];
+    let order: Vec<usize> = (0..steps).flat_map(|step| made.iter().map(move |at| step * count + at)).collect();
+    let mut place = vec![0; steps * count];
     for (n, node) in order.iter().enumerate().filter(|_| limited) {
         place[*node] = n;
         ready[*node] = (n / ISSUED) as u64;
@@ -87,8 +90,8 @@ pub(crate) fn cycles(packed: &Packed, limited: bool) -> f64 {
     }
     let mut units = UNITS.map(|unit| Occupied { busy: Vec::new(), units: unit.count(), from: 0 });
     let mut next: BinaryHeap<Reverse<(u64, usize)>> =
-        (0..STEPS * count).filter(|node| waits[*node] == 0).map(|node| Reverse((ready[node], node))).collect();
-    let mut ends = [0u64; STEPS];
+        (0..steps * count).filter(|node| waits[*node] == 0).map(|node| Reverse((ready[node], node))).collect();
+    let mut ends = vec![0u64; steps];
     while let Some(Reverse((time, node))) = next.pop() {
         let (step, at) = (node / count, node % count);
         let done = match timings[at] {
@@ -99,7 +102,7 @@ pub(crate) fn cycles(packed: &Packed, limited: bool) -> f64 {
             None => time,
         };
         ends[step] = ends[step].max(done);
-        let behind = later[at].iter().filter(|_| step + 1 < STEPS).map(|old| (step + 1) * count + old);
+        let behind = later[at].iter().filter(|_| step + 1 < steps).map(|old| (step + 1) * count + old);
         let window = (limited && timings[at].is_some()).then(|| order.get(place[node] + WINDOW).copied()).flatten();
         for user in users[at].iter().map(|user| step * count + user).chain(behind).chain(window) {
             ready[user] = ready[user].max(done);
@@ -109,7 +112,7 @@ pub(crate) fn cycles(packed: &Packed, limited: bool) -> f64 {
             }
         }
     }
-    (ends[STEPS - 1] - ends[WARM - 1].min(ends[STEPS - 1])) as f64 / (STEPS - WARM) as f64
+    (ends[steps - 1] - ends[warm - 1].min(ends[steps - 1])) as f64 / (steps - warm) as f64
 }
 
 /// After how many cycles a vector is there, when what it is made of is.

@@ -10,7 +10,7 @@
 //! makes it longer. So several packings are tried, and a model of the CPU (`estimate`) tells how many cycles a step takes with
 //! each; one is used if it gains by `LEAST_GAIN`.
 
-mod estimate;
+pub(super) mod estimate;
 mod find;
 mod lower;
 mod packed;
@@ -27,8 +27,11 @@ const FEWEST_OPERATIONS: usize = 8;
 /// In longer steps less is tried, so that it does not take long, and nothing is made a second time: there are enough operations
 /// that do not wait for what is moved.
 const LONG_STEP_OPERATIONS: usize = 600;
-/// Steps longer than that are not looked at: it would take some 50 ms. They are seldom a single tape.
-const MOST_OPERATIONS: usize = 5000;
+/// In steps of so many, such as those of a series, only the widest vectors are tried: each trial takes as long as thousands of steps.
+const VERY_LONG_STEP_OPERATIONS: usize = 5000;
+/// Steps longer than that are not looked at: it would take seconds. None is one tape, whose operations are
+/// estimated to be at most 100 000, and may be twice as many.
+const MOST_OPERATIONS: usize = 250_000;
 
 /// What is tried: how many successive numbers of the state are made by one vector, and how many roots.
 const TRIALS: [(usize, usize); 6] = [(1, 4), (2, 4), (3, 4), (4, 4), (1, 2), (2, 2)];
@@ -81,7 +84,11 @@ pub fn best(body: &Body) -> Option<(Verdict, Option<Packed>)> {
             *best = Some((trial, packed));
         }
     };
-    let trials = if operations > LONG_STEP_OPERATIONS { &TRIALS[..3] } else { &TRIALS };
+    let trials = match operations {
+        _ if operations > VERY_LONG_STEP_OPERATIONS => &TRIALS[2..4],
+        _ if operations > LONG_STEP_OPERATIONS => &TRIALS[..4],
+        _ => &TRIALS[..],
+    };
     for &(together, roots) in trials {
         attempt(Trial { together, roots, again: false }, &mut best);
     }

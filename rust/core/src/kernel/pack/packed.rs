@@ -54,6 +54,11 @@ impl Vector {
     pub(crate) fn of(&self) -> &[u32] {
         &self.of[..self.operands as usize]
     }
+
+    /// Whether it is there before the step.
+    pub(crate) fn is_leaf(&self) -> bool {
+        matches!(self.make, Make::State(_) | Make::Fixed(_) | Make::Now(_))
+    }
 }
 
 /// A vector of numbers of the state.

@@ -8,7 +8,7 @@ use crate::{
         instruction_set::InstructionSet,
         plan::{KernelPlan, Packing, Source, Step, masks},
     },
-    tape::{Op, split::Body},
+    tape::{Op, fast_hash::Places, split::Body},
 };
 
 impl<I: Copy> KernelPlan<I> {
@@ -22,7 +22,7 @@ impl<I: Copy> KernelPlan<I> {
             steps: Vec::with_capacity(packed.vectors.len()),
             next: packed.state.iter().map(|state| Some(state.next)).collect(),
             old: packed.state.iter().map(|state| Some(state.old)).collect(),
-            constants: Vec::new(),
+            constants: Places::default(),
             per_step: body.per_step,
             packing: None,
         };
@@ -80,7 +80,7 @@ impl<I: Copy> KernelPlan<I> {
             homes.packing.widths.push(MOST_LANES as u8);
         }
         // Uniforms stand behind the constants.
-        let constants = plan.constants.len() as u32;
+        let constants = plan.constants.list.len() as u32;
         for (source, _) in &mut homes.packing.brought {
             if let Source::Pool(i) = source {
                 *i = if (*i as usize) < body.uniforms { *i + constants } else { *i - body.uniforms as u32 };

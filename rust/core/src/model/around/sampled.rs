@@ -71,8 +71,17 @@ pub(crate) fn numbers(signature: &Signature) -> usize {
     1 + made.saturating_sub(set) + set * (signature.whole(WAITING) + 1) + held
 }
 
+/// How many numbers of a parameter it sets; none of another.
+pub(crate) fn sets(signature: &Signature, name: &str) -> Option<usize> {
+    let is_set = signature.controller.is_some() && names(signature).any(|each| each == name);
+    is_set.then(|| signature.count(name))
+}
+
 /// What stands in each row between two steps.
 pub(crate) fn set(p: &mut Parameters<Symbol>, memory: &Block<Symbol>) {
+    if p.signature.controller.is_none() {
+        return;
+    }
     let rows = rows(p.signature);
     let queue = memory.len().saturating_sub(rows.len() * (p.signature.whole(WAITING) + 1));
     let held = if p.signature.count(LATER) > 0 { memory.len() - rows.len() } else { queue };

@@ -124,7 +124,7 @@ pub const RECORD: Record = Record {
     name: "dop853",
     title: "Dormand-Prince 8(5,3)",
     other_names: &["DOP853", "Dormand-Prince 8"],
-    false_friends: &["Dormand-Prince 8(7)", "RK45, which is Dormand-Prince 5(4)"],
+    false_friends: &["Dormand-Prince 8(7)", "Dormand-Prince 5(4)"],
     order: 8,
     family: "Runge-Kutta",
     limit: 5.960_359_811_702_78,

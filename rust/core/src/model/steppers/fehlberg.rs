@@ -28,7 +28,7 @@ pub const RECORD: Record = Record {
     name: "fehlberg",
     title: "RK-Fehlberg 4(5)",
     other_names: &["RKF45", "Runge-Kutta-Fehlberg"],
-    false_friends: &["RK45, which is Dormand-Prince 5(4)", "RK-Merson"],
+    false_friends: &["RK45", "RK-Merson"],
     order: 4,
     family: "Runge-Kutta",
     limit: 0.0,

@@ -11,12 +11,7 @@ pub const RECORD: Record = Record {
     name: "fehlberg_5",
     title: "RK-Fehlberg 5(4)",
     other_names: &["RKF45 with local extrapolation"],
-    false_friends: &[
-        "RK-Fehlberg 4(5)",
-        "Dormand-Prince 5(4)",
-        "dopri5, which is Dormand-Prince 5(4)",
-        "ode45, which is Dormand-Prince 5(4)",
-    ],
+    false_friends: &["RK-Fehlberg 4(5)", "Dormand-Prince 5(4)"],
     order: 5,
     family: "Runge-Kutta",
     limit: 0.0,

@@ -25,8 +25,8 @@ pub const RECORD: Record = Record {
     section: "§12",
     reference: "R. H. Merson, An operational method for the study of integration processes, Proc. Symp. Data Processing (1957)",
     about: "Five evaluations, fourth order, and an estimate of its own error for adaptive steps (tolerance=). It \
-            damps an undamped oscillator very slightly, r₁² = 1 − Φ⁸/1728, up to Φ = 2√3. The estimate is of fifth order for \
-            linear equations and too large for others.",
+            damps an undamped oscillator very slightly, r₁² = 1 − Φ⁸/1728 + Φ¹⁰/20736, up to Φ = 2√3. The estimate is of fifth \
+            order for linear equations and too large for others.",
     step,
 };
 

@@ -70,6 +70,9 @@ pub trait Operand: Number {
 
     /// Notes the derivatives of a value by others, and its bounds.
     fn mark(self, _by: Vec<(Self, Self)>, _bounds: Option<[f64; 2]>) {}
+
+    /// Notes that a series may begin at the ends of domains.
+    fn mark_ends() {}
 }
 
 impl Operand for f64 {
@@ -91,6 +94,10 @@ impl Operand for Symbol {
 
     fn mark(self, by: Vec<(Symbol, Symbol)>, bounds: Option<[f64; 2]>) {
         series::mark(self, series::Mark::Factors(by, bounds));
+    }
+
+    fn mark_ends() {
+        series::mark_ends();
     }
 }
 
@@ -174,10 +181,11 @@ impl<N: Operand> Own<N> {
             made.push(value);
         }
         if N::is_marking() {
-            for (value, by, bounds) in self.equations.functions.iter().filter(|(value, ..)| needed[*value as usize]) {
-                let by = by.iter().map(|(of, factor)| (made[*of as usize], made[*factor as usize])).collect();
-                made[*value as usize].mark(by, bounds.map(|bounds| bounds.map(f64::from_bits)));
+            for each in self.equations.functions.iter().filter(|each| needed[each.value as usize]) {
+                let by = each.by.iter().map(|(of, factor)| (made[*of as usize], made[*factor as usize])).collect();
+                made[each.value as usize].mark(by, each.bounds.map(|bounds| bounds.map(f64::from_bits)));
             }
+            N::mark_ends();
         }
         Block::from_iterator(roots.len(), roots.iter().map(|id| made[*id as usize]))
     }

@@ -1,0 +1,113 @@
+"""Events that the core looks for while it makes the steps."""
+
+from __future__ import annotations
+
+from math import prod
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ... import _core
+from ...base.arrays import Array
+from .. import engine
+from .collected import Collected
+from .evaluated import Evaluated
+from .parts import Located
+from .timed import Timed
+
+
+class Values(NamedTuple):
+    """Values of a tape, and the parameters that it reads: each one number for all members, or one for each."""
+
+    of: _core.Evaluation
+    parameters: list[Array]
+
+
+class OfCore(NamedTuple):
+    """An event: its quantity and the slope of that, None if it has no derivative, as values."""
+
+    quantity: Values
+    slope: Values | None
+    direction: float
+    terminal: int
+    most: int
+
+
+class Sought(NamedTuple):
+    """All events of a run, and the motion of its members.
+
+    Attributes:
+        events: the events.
+        step: a step, of a time, a length and a state.
+        rates: by how much a state changes in a step, likewise.
+        numbers: how many numbers a state has.
+        begin: the times of step 0, one for all or one of each member.
+        sign: −1 where the time of the run is negated.
+    """
+
+    events: list[OfCore]
+    step: Values
+    rates: Values
+    numbers: int
+    begin: Array
+    sign: float
+
+
+def sought(search: Collected) -> Sought | None:
+    """What the core is to look for; None where a part of it is no tape for numbers of 64 bits, as of many bodies."""
+    plan = search.plan
+    is_plain = bool(search.events) and plan.backend == "rust" and plan.device is None and not (plan.single or plan.fused)
+    if not is_plain or plan.system.controller is not None or plan.system.mass_matrix is not None:
+        return None
+    step, rates = search.trials.traced_step(), search.trials.traced_rates()
+    if step is None or rates is None:
+        return None
+    events = []
+    for event, quantity in zip(search.events, search.quantities, strict=True):
+        if isinstance(quantity, Timed):  # its times are known
+            return None
+        numbers = quantity.numbers(search.members.parameters)
+        value, slope = quantity.evaluated
+        of_slope = None if slope is None else _values(slope, numbers)
+        of_value = _values(value, numbers)
+        if of_value is None or (slope is not None and of_slope is None):
+            return None
+        events.append(OfCore(of_value, of_slope, float(event.direction), int(event.terminal), event.most))
+    both = [_values(*each) for each in (step, rates)]
+    if both[0] is None or both[1] is None:
+        return None
+    begin = np.ascontiguousarray(np.broadcast_to(plan.t0, plan.batch).reshape(-1) if np.ndim(plan.t0) else [plan.t0], np.float64)
+    n = prod(plan.system.v_shape) + prod(plan.system.y_shape)
+    return Sought(events, both[0], both[1], n, begin, search.sign)
+
+
+def _values(evaluated: Evaluated, numbers: list[Array]) -> Values | None:
+    of = evaluated.evaluation
+    return None if of is None else Values(of, [np.ascontiguousarray(each, dtype=np.float64).reshape(-1) for each in numbers])
+
+
+def made(search: Collected, sought: Sought, model: _core.ModelSpec, plan: engine.Plan, arrays: engine.Arrays) -> bool:
+    """Make a run of fixed steps, as ``_core.run``."""
+    diverged, found = _core.run_and_look(model, plan, arrays, sought)
+    take(search, found)
+    return diverged
+
+
+def adapted(search: Collected, sought: Sought, model: _core.ModelSpec, plan: engine.Plan, pacing: Any, arrays: Any) -> bool:
+    """Make a run of adaptive steps, as ``_core.adapt``."""
+    done, found = _core.adapt_and_look(model, plan, pacing, arrays, sought)
+    take(search, found)
+    return done
+
+
+def take(search: Collected, found: Any) -> None:
+    """Take what the core found."""
+    of_each, counts, stopped_at, search.other_steps = found
+    shapes = search.plan.system.v_shape, search.plan.system.y_shape
+    n_v, n = prod(shapes[0]), prod(shapes[0]) + prod(shapes[1])
+    search.count[...] = counts.reshape(search.count.shape)
+    search.stopped_at[...] = stopped_at
+    for entries, (member, step, share, t, states) in zip(search.entries, of_each, strict=True):
+        rows = states.reshape(-1, n).T
+        v, y = (block.reshape(*shape, len(member)) for block, shape in zip((rows[:n_v], rows[n_v:]), shapes, strict=True))
+        entries.append(Located(member, step, share, t, v, y))

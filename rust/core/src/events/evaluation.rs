@@ -1,0 +1,184 @@
+//! Values of a tape for many members, each from numbers of its own: what is looked at between steps.
+
+use std::sync::{Arc, LazyLock};
+
+use crate::{
+    aligned::Aligned,
+    error::Error,
+    isa::Level,
+    kernel::{Tile, runner::KernelKind},
+    model::spec::Row,
+    stage::{CompiledStage, Stage},
+    step::cache::Cache,
+    tape::{
+        Id, Op, Tape,
+        split::{Body, Split},
+    },
+};
+
+/// Values with their kernels, which all that have the same operations share.
+#[derive(Clone)]
+pub struct Evaluation {
+    stage: Arc<Stage>,
+    states: usize,
+}
+
+impl Evaluation {
+    /// Of values that depend on `states` numbers of the state and on parameters; none if they depend on a step, a time or an input.
+    pub fn new(tape: &Tape, values: &[Id], states: usize) -> Result<Option<Evaluation>, Error> {
+        static CACHE: LazyLock<Cache<Body, Stage>> = LazyLock::new(Cache::default);
+        let body = Body::of_values(tape, values, states as u32);
+        if body.ops.iter().any(|op| matches!(op, Op::Step | Op::Time | Op::Sample(..))) {
+            return Ok(None);
+        }
+        let make = || Ok((Stage::new(Split { body: body.clone(), ..Split::default() }), body.ops.len()));
+        Ok(Some(Evaluation { stage: CACHE.find(&body, make)?, states }))
+    }
+
+    /// How many values there are.
+    pub fn values(&self) -> usize {
+        self.stage.split.body.next.len()
+    }
+
+    /// Computes the values of so many members, by rows, from rows of the state and of the parameters.
+    pub fn run(&self, level: Level, (state, parameters): (&[Row], &[Row]), members: usize, values: &mut [f64]) {
+        // A power of two, since kernels for fewer members than that are kept.
+        let compiled = self.stage.compiled(level, members.next_power_of_two());
+        let mut tile = Filled::new(self, compiled);
+        let missing = Row(&[f64::NAN]);
+        let row = |i: usize| match i.checked_sub(self.states) {
+            None => state.get(i),
+            Some(parameter) => parameters.get(parameter),
+        };
+        let inputs: Vec<&Row> = (0..self.stage.split.body.rows).map(|i| row(i).unwrap_or(&missing)).collect();
+        for first in (0..members).step_by(tile.lanes) {
+            let count = tile.lanes.min(members - first);
+            for (i, input) in inputs.iter().enumerate() {
+                input.fill(first, count, tile.row(i));
+            }
+            tile.run();
+            for (value, row) in values.chunks_exact_mut(members).zip(tile.values.chunks_exact(tile.lanes)) {
+                value[first..first + count].copy_from_slice(&row[..count]);
+            }
+        }
+    }
+}
+
+/// The rows of a tile, to fill and to run.
+pub(crate) struct Filled {
+    compiled: Arc<CompiledStage>,
+    pub lanes: usize,
+    states: usize,
+    rows: Aligned,
+    /// A row for each value.
+    pub values: Aligned,
+    pool: Option<(KernelKind, Vec<f64>)>,
+    scratch: Vec<f64>,
+}
+
+impl Filled {
+    fn new(evaluation: &Evaluation, compiled: Arc<CompiledStage>) -> Filled {
+        let lanes = compiled.runner.lanes();
+        let body = &evaluation.stage.split.body;
+        let (rows, values) = (Aligned::new(body.rows * lanes), Aligned::new(body.next.len() * lanes));
+        Filled { compiled, lanes, states: evaluation.states, rows, values, pool: None, scratch: Vec::new() }
+    }
+
+    /// For rows of so many lanes.
+    pub(crate) fn of_lanes(evaluation: &Evaluation, level: Level, lanes: usize) -> Filled {
+        Filled::new(evaluation, evaluation.stage.compiled_for_lanes(level, lanes))
+    }
+
+    /// A row of the state or, behind these, of the parameters; of those that nothing depends on there may be none.
+    pub(crate) fn row(&mut self, i: usize) -> &mut [f64] {
+        self.rows.chunks_exact_mut(self.lanes).nth(i).unwrap_or_default()
+    }
+
+    /// Takes the parameters of so many members from `first` on.
+    pub(crate) fn prepare(&mut self, parameters: &[Row], first: usize, count: usize) {
+        for (i, parameter) in parameters.iter().enumerate() {
+            let row = self.row(self.states + i);
+            if !row.is_empty() {
+                parameter.fill(first, count, row);
+            }
+        }
+    }
+
+    /// Takes the parameters of a member into a lane.
+    pub(crate) fn prepare_lane(&mut self, parameters: &[Row], lane: usize, member: usize) {
+        for (i, parameter) in parameters.iter().enumerate() {
+            if let Some(number) = self.row(self.states + i).get_mut(lane) {
+                *number = parameter.at(member);
+            }
+        }
+    }
+
+    /// Computes the values.
+    pub(crate) fn run(&mut self) {
+        let (kernel, kind) = self.compiled.runner.kernel(1);
+        if self.pool.as_ref().is_none_or(|(known, _)| *known != kind) {
+            self.pool = Some((kind, kernel.pool(&[])));
+        }
+        let pool = self.pool.as_ref().map_or(&[][..], |(_, pool)| pool);
+        let tile = &mut Tile { state: &mut self.values, rows: &self.rows, pool, steps: 1, per_step: &[], held: &[] };
+        kernel.run(tile, &mut self.scratch);
+    }
+}
+
+/// Values for any members, asked for again and again, some at a time.
+pub(crate) struct Evaluator<'a> {
+    evaluation: &'a Evaluation,
+    parameters: &'a [Row<'a>],
+    level: Level,
+    /// For one or two members, and for many.
+    tiles: [Option<Filled>; 2],
+}
+
+/// Fewer members are computed one by one.
+const FEW: usize = 3;
+/// So many together are worth the most lanes.
+const MANY: usize = 64;
+
+impl<'a> Evaluator<'a> {
+    pub(crate) fn new(evaluation: &'a Evaluation, parameters: &'a [Row<'a>], level: Level) -> Self {
+        Evaluator { evaluation, parameters, level, tiles: [None, None] }
+    }
+
+    /// The values of each of these members, one after the other, from its numbers of the state, which follow each other likewise.
+    pub(crate) fn run(&mut self, members: &[usize], states: &[f64]) -> Vec<f64> {
+        let is_many = members.len() >= FEW;
+        let (n, results, read) = (self.evaluation.states, self.evaluation.values(), self.evaluation.stage.split.body.rows);
+        let made = || {
+            let compiled = self.evaluation.stage.compiled(self.level, if is_many { MANY } else { 1 });
+            let mut tile = Filled::new(self.evaluation, compiled);
+            for (i, parameter) in self.parameters.iter().enumerate().filter(|(_, parameter)| parameter.is_common()) {
+                tile.row(n + i).fill(parameter.at(0));
+            }
+            tile
+        };
+        let tile = self.tiles[usize::from(is_many)].get_or_insert_with(made);
+        let lanes = tile.lanes;
+        let mut values = vec![0.0; members.len() * results];
+        let own = self.parameters.iter().enumerate().filter(|(i, parameter)| n + i < read && !parameter.is_common());
+        for (i, some) in members.chunks(lanes).enumerate() {
+            let first = i * lanes;
+            let given = &states[first * n..(first + some.len()) * n];
+            for (row, numbers) in tile.rows.chunks_exact_mut(lanes).take(read.min(n)).enumerate() {
+                let last = given[(some.len() - 1) * n + row];
+                numbers.iter_mut().zip(given.chunks_exact(n)).for_each(|(to, state)| *to = state[row]);
+                numbers[some.len()..].fill(last);
+            }
+            for (row, parameter) in own.clone() {
+                let numbers = tile.row(n + row);
+                numbers.iter_mut().zip(some).for_each(|(to, member)| *to = parameter.0[*member]);
+                numbers[some.len()..].fill(parameter.0[some[some.len() - 1]]);
+            }
+            tile.run();
+            let to = &mut values[first * results..(first + some.len()) * results];
+            for (result, row) in tile.values.chunks_exact(lanes).enumerate() {
+                to.chunks_exact_mut(results).zip(row).for_each(|(to, number)| to[result] = *number);
+            }
+        }
+        values
+    }
+}

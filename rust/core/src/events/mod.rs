@@ -1,0 +1,8 @@
+//! Events: changes of sign of quantities along a motion. They are looked for between the states of steps, and located within a
+//! step by steps of other lengths from its start.
+
+pub mod evaluation;
+pub mod found;
+pub mod motion;
+pub(crate) mod search;
+pub(crate) mod watch;

@@ -1,0 +1,171 @@
+//! What is known of a motion between the states of its steps: steps of any length, rates, and the quantities of events.
+
+use std::{fmt, sync::Mutex};
+
+use super::{
+    evaluation::{Evaluation, Evaluator, Filled},
+    found::Found,
+};
+use crate::{isa::Level, model::spec::Row};
+
+/// The slope of a quantity without derivative is its change over this share of a step, divided by the share.
+const SHORT: f64 = 1.0 / (1u64 << 26) as f64;
+
+/// Values and the parameters that they depend on, by rows.
+pub struct Values<'a> {
+    /// The values.
+    pub of: Evaluation,
+    /// One number for all members, or one for each.
+    pub parameters: Vec<Row<'a>>,
+}
+
+impl Values<'_> {
+    fn evaluator(&self, level: Level) -> Evaluator<'_> {
+        Evaluator::new(&self.of, &self.parameters, level)
+    }
+}
+
+/// An event.
+pub struct Event<'a> {
+    /// Its quantity, of a time and a state.
+    pub quantity: Values<'a>,
+    /// The rate of change of that, of a time, a state and the rates of change of these; none if it has no derivative.
+    pub slope: Option<Values<'a>>,
+    /// The sign of the changes that count; 0 for both.
+    pub direction: f64,
+    /// At which change it stops a member; 0 for none.
+    pub terminal: i64,
+    /// How many changes of a member are kept.
+    pub most: i64,
+}
+
+/// The events of a run, and the motion of its members.
+pub struct Events<'a> {
+    /// The events.
+    pub events: Vec<Event<'a>>,
+    /// A step, of a time, a length and a state.
+    pub step: Values<'a>,
+    /// By how much a state changes in a step at its rates, of the same numbers.
+    pub rates: Values<'a>,
+    /// How many numbers a state has, v before y.
+    pub numbers: usize,
+    /// The times of step 0.
+    pub begin: Row<'a>,
+    /// −1 where the time of the run is that of the events, negated.
+    pub sign: f64,
+    /// What hot loops may use.
+    pub level: Level,
+    /// What was found so far.
+    pub found: Mutex<Found>,
+}
+
+impl fmt::Debug for Events<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Events").field("number", &self.events.len()).finish_non_exhaustive()
+    }
+}
+
+/// States of members at times, of `numbers` each, one after the other.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct States {
+    pub members: Vec<usize>,
+    pub t: Vec<f64>,
+    pub numbers: Vec<f64>,
+}
+
+impl States {
+    pub(crate) fn push(&mut self, member: usize, t: f64, state: &[f64]) {
+        self.members.push(member);
+        self.t.push(t);
+        self.numbers.extend_from_slice(state);
+    }
+}
+
+/// Answers questions about the motion of any members.
+pub(crate) struct Motion<'a> {
+    pub events: &'a Events<'a>,
+    step: Evaluator<'a>,
+    rates: Evaluator<'a>,
+    quantities: Vec<(Evaluator<'a>, Option<Evaluator<'a>>)>,
+}
+
+impl<'a> Motion<'a> {
+    pub(crate) fn new(events: &'a Events<'a>) -> Self {
+        let level = events.level;
+        let of =
+            |event: &'a Event<'a>| (event.quantity.evaluator(level), event.slope.as_ref().map(|slope| slope.evaluator(level)));
+        Motion {
+            events,
+            step: events.step.evaluator(level),
+            rates: events.rates.evaluator(level),
+            quantities: events.events.iter().map(of).collect(),
+        }
+    }
+
+    /// Time, length and state of each, one after the other.
+    fn with_lengths(&self, from: &States, lengths: &[f64]) -> Vec<f64> {
+        let n = self.events.numbers;
+        let mut inputs = Vec::with_capacity(from.t.len() * (n + 2));
+        for (i, (t, h)) in from.t.iter().zip(lengths).enumerate() {
+            inputs.extend([*t, *h]);
+            inputs.extend_from_slice(&from.numbers[i * n..(i + 1) * n]);
+        }
+        inputs
+    }
+
+    /// The states after steps of these lengths.
+    pub(crate) fn steps(&mut self, from: &States, lengths: &[f64]) -> States {
+        let inputs = self.with_lengths(from, lengths);
+        let numbers = self.step.run(&from.members, &inputs);
+        let t = from.t.iter().zip(lengths).map(|(t, h)| t + h).collect();
+        States { members: from.members.clone(), t, numbers }
+    }
+
+    /// The quantity of an event.
+    pub(crate) fn quantity(&mut self, e: usize, at: &States) -> Vec<f64> {
+        let (n, sign) = (self.events.numbers, self.events.sign);
+        let mut inputs = Vec::with_capacity(at.t.len() * (n + 1));
+        for (i, t) in at.t.iter().enumerate() {
+            inputs.push(sign * *t);
+            inputs.extend_from_slice(&at.numbers[i * n..(i + 1) * n]);
+        }
+        self.quantities[e].0.run(&at.members, &inputs)
+    }
+
+    /// By how much it would change in a step of such a length at the present rates.
+    pub(crate) fn slopes(&mut self, e: usize, at: &States, lengths: &[f64]) -> Vec<f64> {
+        let (n, sign) = (self.events.numbers, self.events.sign);
+        let inputs = self.with_lengths(at, lengths);
+        let rates = self.rates.run(&at.members, &inputs);
+        let Some(slope) = &mut self.quantities[e].1 else { return self.differences(e, at, lengths, &rates) };
+        let mut inputs = Vec::with_capacity(at.t.len() * 2 * (n + 1));
+        for (i, (t, h)) in at.t.iter().zip(lengths).enumerate() {
+            inputs.push(sign * *t);
+            inputs.extend_from_slice(&at.numbers[i * n..(i + 1) * n]);
+            inputs.push(sign * *h);
+            inputs.extend_from_slice(&rates[i * n..(i + 1) * n]);
+        }
+        slope.run(&at.members, &inputs).into_iter().map(finite).collect()
+    }
+
+    /// The same from a short step.
+    fn differences(&mut self, e: usize, at: &States, lengths: &[f64], rates: &[f64]) -> Vec<f64> {
+        let sign = self.events.sign;
+        let t = at.t.iter().zip(lengths).map(|(t, h)| sign * (sign * *t + SHORT * (sign * *h))).collect();
+        let numbers = at.numbers.iter().zip(rates).map(|(x, rate)| x + SHORT * rate).collect();
+        let there = self.quantity(e, &States { members: at.members.clone(), t, numbers });
+        let here = self.quantity(e, at);
+        there.into_iter().zip(here).map(|(there, here)| finite((there - here) / SHORT)).collect()
+    }
+
+    /// Quantities of all events in lanes.
+    pub(crate) fn in_lanes(&self, lanes: usize) -> Vec<Filled> {
+        let of = |event: &Event| Filled::of_lanes(&event.quantity.of, self.events.level, lanes);
+        self.events.events.iter().map(of).collect()
+    }
+}
+
+/// NaN says nothing, and so counts as zero; what is infinite as the largest number.
+pub(crate) fn finite(x: f64) -> f64 {
+    if x.is_nan() { 0.0 } else { x.clamp(f64::MIN, f64::MAX) }
+}

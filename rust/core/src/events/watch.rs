@@ -1,0 +1,434 @@
+//! Which events occur in steps: changes of sign are counted, located and kept, and members stop at them.
+
+use std::sync::{Arc, PoisonError};
+
+use super::{
+    found::Found,
+    motion::{Events, Motion, States},
+    search::{LEAST_SHARE, Looks, Part, located, parted, sign},
+};
+use crate::step::watch::REACH;
+
+/// So many changes of sign are located together.
+const LOCATED_AT_ONCE: usize = 1 << 10;
+
+/// A whole step of a member.
+#[derive(Debug)]
+pub(crate) struct Step {
+    pub member: usize,
+    /// Its number, or how many steps the member had taken before.
+    pub number: i64,
+    pub t: f64,
+    pub h: f64,
+    pub start: Vec<f64>,
+    pub end: Vec<f64>,
+    /// After and until which times events count, if not in all of it.
+    pub window: Option<[f64; 2]>,
+}
+
+/// A step in which an event may occur, with its quantity at both ends.
+pub(crate) struct Candidate {
+    pub step: Arc<Step>,
+    pub g: [f64; 2],
+}
+
+/// A step in which some events may occur: their numbers and quantities.
+pub(crate) struct Candidates {
+    pub step: Arc<Step>,
+    pub events: Vec<(usize, [f64; 2])>,
+}
+
+/// Steps of a member that follow each other, in which an event may occur: from the state at the start of the first.
+pub(crate) struct Noticed {
+    pub member: usize,
+    /// The number of the first step, and of the one before which they end.
+    pub number: i64,
+    pub until: i64,
+    /// The time of step 0, and how long steps are.
+    pub begin: f64,
+    pub h: f64,
+    pub start: Vec<f64>,
+    /// Each quantity one step before.
+    pub before: Vec<f64>,
+}
+
+impl Noticed {
+    /// The time at the start of the step.
+    fn time(&self) -> f64 {
+        self.begin + self.number as f64 * self.h
+    }
+}
+
+/// Those of so many numbers each that go on.
+fn kept(numbers: &[f64], on: &[bool], each: usize) -> Vec<f64> {
+    let some = numbers.chunks_exact(each.max(1)).zip(on).filter(|(_, on)| **on);
+    some.flat_map(|(numbers, _)| numbers).copied().collect()
+}
+
+/// A part of a step in which a quantity changes its sign once.
+#[derive(Clone)]
+struct Change {
+    step: Arc<Step>,
+    part: Part,
+}
+
+/// A located change.
+#[derive(Clone)]
+struct Located {
+    step: Arc<Step>,
+    share: f64,
+    t: f64,
+    state: Vec<f64>,
+}
+
+/// Where a member stops: in this step.
+pub(crate) struct Stop {
+    pub step: Arc<Step>,
+    pub t: f64,
+    pub state: Vec<f64>,
+}
+
+/// The events of some members, by one thread.
+pub(crate) struct Watch<'a> {
+    pub motion: Motion<'a>,
+    first: usize,
+    found: Found,
+    /// Steps in which something may occur.
+    noticed: Vec<Noticed>,
+    /// In which the event may occur, and in which it does: they are located later, with others.
+    candidates: Vec<Vec<Candidate>>,
+    changes: Vec<Vec<Change>>,
+}
+
+impl<'a> Watch<'a> {
+    pub(crate) fn new(events: &'a Events<'a>) -> Self {
+        let none = || events.events.iter().map(|_| Vec::new()).collect();
+        Watch {
+            motion: Motion::new(events),
+            first: 0,
+            found: Found::default(),
+            noticed: Vec::new(),
+            candidates: none(),
+            changes: events.events.iter().map(|_| Vec::new()).collect(),
+        }
+    }
+
+    /// Begins with so many members from `first` on.
+    pub(crate) fn begin(&mut self, first: usize, members: usize) {
+        self.first = first;
+        self.found = Found::new(self.motion.events.events.len(), members);
+    }
+
+    /// Ends with these members.
+    pub(crate) fn end(&mut self) {
+        let noticed = std::mem::take(&mut self.noticed);
+        let steps = self.made_again(noticed);
+        self.take(steps);
+        (0..self.changes.len()).for_each(|e| self.locate_waiting(e));
+        let found = std::mem::take(&mut self.found);
+        self.motion.events.found.lock().unwrap_or_else(PoisonError::into_inner).take(found, self.first);
+    }
+
+    /// Notes that a saved time changed the steps of a member.
+    pub(crate) fn has_other_steps(&mut self, member: usize) {
+        self.found.other_steps[member - self.first] = true;
+    }
+
+    /// Whether an event ends the run of a member.
+    pub(crate) fn stops(&self) -> bool {
+        self.motion.events.events.iter().any(|event| event.terminal > 0)
+    }
+
+    fn count(&mut self, e: usize, member: usize) -> &mut i64 {
+        let members = self.found.stopped_at.len();
+        &mut self.found.counts[e * members + member - self.first]
+    }
+
+    /// Takes steps in which events may occur, in the order of time of each member, up to where a member stops.
+    pub(crate) fn take(&mut self, steps: Vec<Candidates>) -> Vec<Stop> {
+        let mut of_events: Vec<Vec<Candidate>> = self.candidates.iter().map(|_| Vec::new()).collect();
+        for candidates in steps {
+            for (e, g) in candidates.events {
+                of_events[e].push(Candidate { step: Arc::clone(&candidates.step), g });
+            }
+        }
+        if self.stops() {
+            let changes = of_events.into_iter().enumerate().map(|(e, each)| self.within(e, each)).collect();
+            return self.taken(changes);
+        }
+        for (e, each) in of_events.into_iter().enumerate() {
+            self.candidates[e].extend(each);
+            if self.candidates[e].len() >= LOCATED_AT_ONCE {
+                self.locate_waiting(e);
+            }
+        }
+        Vec::new()
+    }
+
+    /// Takes steps in which events may occur, of which the start is known; as `take`.
+    pub(crate) fn notice(&mut self, noticed: Vec<Noticed>) -> Vec<Stop> {
+        if self.stops() || self.noticed.len() + noticed.len() >= LOCATED_AT_ONCE {
+            let all: Vec<_> = std::mem::take(&mut self.noticed).into_iter().chain(noticed).collect();
+            let steps = self.made_again(all);
+            return self.take(steps);
+        }
+        self.noticed.extend(noticed);
+        Vec::new()
+    }
+
+    /// Makes steps again that were noticed; in the order of time of each member.
+    fn made_again(&mut self, mut noticed: Vec<Noticed>) -> Vec<Candidates> {
+        let (n, events) = (self.motion.events.numbers, self.motion.events.events.len());
+        let (mut candidates, mut starts) = (Vec::new(), States::default());
+        noticed.iter().for_each(|each| starts.push(each.member, each.time(), &each.start));
+        // Each quantity one step before, at the start and at the end of steps: by event.
+        let mut before: Vec<Vec<f64>> = (0..events).map(|e| noticed.iter().map(|each| each.before[e]).collect()).collect();
+        let mut now: Vec<Vec<f64>> = (0..events).map(|e| self.motion.quantity(e, &starts)).collect();
+        while !noticed.is_empty() {
+            let lengths: Vec<f64> = noticed.iter().map(|each| each.h).collect();
+            let mut ends = self.motion.steps(&starts, &lengths);
+            let next: Vec<Vec<f64>> = (0..events).map(|e| self.motion.quantity(e, &ends)).collect();
+            for (i, each) in noticed.iter_mut().enumerate() {
+                if (0..events).any(|e| may_change(before[e][i], now[e][i], next[e][i])) {
+                    let [start, end] = [&starts, &ends].map(|states| states.numbers[i * n..(i + 1) * n].to_vec());
+                    let of_events = (0..events).filter(|e| may_change(before[*e][i], now[*e][i], next[*e][i]));
+                    let events = of_events.map(|e| (e, [now[e][i], next[e][i]])).collect();
+                    if start.iter().chain(&end).all(|x| x.is_finite()) {
+                        let step = Step {
+                            member: each.member,
+                            number: each.number,
+                            t: starts.t[i],
+                            h: each.h,
+                            start,
+                            end,
+                            window: None,
+                        };
+                        candidates.push(Candidates { step: Arc::new(step), events });
+                    }
+                }
+                each.number += 1;
+                ends.t[i] = each.time();
+            }
+            (before, now, starts) = (now, next, ends);
+            if noticed.iter().any(|each| each.number >= each.until) {
+                let on: Vec<bool> = noticed.iter().map(|each| each.number < each.until).collect();
+                let mut left = on.iter();
+                noticed.retain(|_| left.next() == Some(&true));
+                before.iter_mut().chain(&mut now).for_each(|of| *of = kept(of, &on, 1));
+                starts = States {
+                    members: noticed.iter().map(|each| each.member).collect(),
+                    t: kept(&starts.t, &on, 1),
+                    numbers: kept(&starts.numbers, &on, n),
+                };
+            }
+        }
+        candidates.sort_by_key(|each| (each.step.member, each.step.number));
+        candidates
+    }
+
+    /// The parts of steps in which an event occurs.
+    fn within(&mut self, e: usize, candidates: Vec<Candidate>) -> Vec<Change> {
+        if candidates.is_empty() {
+            return Vec::new();
+        }
+        let (mut starts, mut ends) = (States::default(), States::default());
+        for Candidate { step, .. } in &candidates {
+            starts.push(step.member, step.t, &step.start);
+            ends.push(step.member, step.t + step.h, &step.end);
+        }
+        let lengths: Vec<f64> = candidates.iter().map(|each| each.step.h).collect();
+        let slopes = [&starts, &ends].map(|states| self.motion.slopes(e, states, &lengths));
+        let whole = |(of, each): (usize, &Candidate)| Part {
+            of,
+            low: 0.0,
+            high: 1.0,
+            g_low: each.g[0],
+            g_high: each.g[1],
+            slope_low: slopes[0][of],
+            slope_high: slopes[1][of],
+            state: each.step.end.clone(),
+        };
+        let parts = candidates.iter().enumerate().map(whole).collect();
+        let motion = &mut self.motion;
+        let (parts, _) = parted(parts, &mut |asked| {
+            let (there, g) = trial(motion, e, asked, &|of| &candidates[of].step);
+            let lengths: Vec<f64> = asked.iter().map(|(of, _)| candidates[*of].step.h).collect();
+            let slopes = motion.slopes(e, &there, &lengths);
+            Looks { g, slopes, states: there.numbers }
+        });
+        let direction = self.motion.events.events[e].direction;
+        let counts = |part: &Part| direction == 0.0 || part.g_low * direction < 0.0;
+        let change = |part: Part| Change { step: Arc::clone(&candidates[part.of].step), part };
+        let changes: Vec<Change> = parts.into_iter().filter(counts).map(change).collect();
+        if changes.iter().all(|change| change.step.window.is_none()) {
+            return changes;
+        }
+        let located = self.located(e, changes.clone());
+        let counts = |one: &Located| one.step.window.is_none_or(|[since, until]| one.t > since && one.t <= until);
+        changes.into_iter().zip(located).filter(|(_, one)| counts(one)).map(|(change, _)| change).collect()
+    }
+
+    /// Locates changes of sign.
+    fn located(&mut self, e: usize, changes: Vec<Change>) -> Vec<Located> {
+        let (steps, mut parts): (Vec<_>, Vec<_>) = changes.into_iter().map(|change| (change.step, change.part)).unzip();
+        let motion = &mut self.motion;
+        let shares = located(&mut parts, &mut |asked| {
+            let (there, g) = trial(motion, e, asked, &|i| &steps[i]);
+            (g, there.numbers)
+        });
+        let made = steps.into_iter().zip(parts).zip(shares);
+        made.map(|((step, part), share)| {
+            let t = step.t + if share > LEAST_SHARE { share } else { 0.0 } * step.h;
+            Located { step, share, t, state: part.state }
+        })
+        .collect()
+    }
+
+    /// Counts and keeps these, up to where members stop.
+    fn taken(&mut self, changes: Vec<Vec<Change>>) -> Vec<Stop> {
+        // The step in which a member stops; later ones do not count.
+        let mut last: Vec<(usize, i64)> = Vec::new();
+        for (e, each) in changes.iter().enumerate() {
+            let terminal = self.motion.events.events[e].terminal;
+            let (mut member, mut number) = (usize::MAX, 0);
+            for change in each {
+                let step = &change.step;
+                number = if step.member == member { number + 1 } else { *self.count(e, step.member) + 1 };
+                member = step.member;
+                if terminal > 0 && number >= terminal {
+                    match last.iter_mut().find(|(stopped, _)| *stopped == member) {
+                        Some((_, at)) => *at = step.number.min(*at),
+                        None => last.push((member, step.number)),
+                    }
+                }
+            }
+        }
+        let stops_in = |member: usize| last.iter().find(|(stopped, _)| *stopped == member).map_or(i64::MAX, |(_, at)| *at);
+        let mut in_last: Vec<Vec<Change>> = Vec::new();
+        for (e, each) in changes.into_iter().enumerate() {
+            let (now, before): (Vec<_>, Vec<_>) = each
+                .into_iter()
+                .filter(|change| change.step.number <= stops_in(change.step.member))
+                .partition(|change| change.step.number == stops_in(change.step.member));
+            for change in before {
+                let count = self.count(e, change.step.member);
+                *count += 1;
+                if *count <= self.motion.events.events[e].most {
+                    self.changes[e].push(change);
+                }
+            }
+            if self.changes[e].len() >= LOCATED_AT_ONCE {
+                self.locate_waiting(e);
+            }
+            in_last.push(now);
+        }
+        if last.is_empty() { Vec::new() } else { self.stopped(in_last) }
+    }
+
+    /// Stops members at the first terminal event of these steps, where all occur that are due at that instant.
+    fn stopped(&mut self, in_last: Vec<Vec<Change>>) -> Vec<Stop> {
+        let of_parts: Vec<Vec<[f64; 2]>> =
+            in_last.iter().map(|each| each.iter().map(|change| [change.part.low, change.part.g_low]).collect()).collect();
+        let located: Vec<Vec<Located>> = in_last.into_iter().enumerate().map(|(e, each)| self.located(e, each)).collect();
+        let mut ends: Vec<Located> = Vec::new();
+        for (e, each) in located.iter().enumerate() {
+            let terminal = self.motion.events.events[e].terminal;
+            let (mut member, mut number) = (usize::MAX, 0);
+            for one in each {
+                number = if one.step.member == member { number + 1 } else { *self.count(e, one.step.member) + 1 };
+                member = one.step.member;
+                if terminal == 0 || number != terminal.max(*self.count(e, member) + 1) {
+                    continue;
+                }
+                match ends.iter_mut().find(|end| end.step.member == member) {
+                    Some(end) if one.share < end.share => *end = one.clone(),
+                    Some(_) => {}
+                    None => ends.push(one.clone()),
+                }
+            }
+        }
+        let mut at = States::default();
+        ends.iter().for_each(|end| at.push(end.step.member, end.t, &end.state));
+        for (e, each) in located.into_iter().enumerate() {
+            let now = self.motion.quantity(e, &at);
+            for (end, g) in ends.iter().zip(now) {
+                let mine = each.iter().zip(&of_parts[e]).filter(|(one, _)| one.step.member == end.step.member);
+                let mut around = mine.filter(|(one, [low, _])| *low <= end.share && end.share <= one.share);
+                // The first part around the instant says from which side it came.
+                let due = around.next().is_some_and(|(one, [_, came])| one.share == end.share || sign(*came) * sign(g) <= 0.0);
+                for one in each.iter().filter(|one| one.step.member == end.step.member && one.share < end.share) {
+                    self.note(e, one.clone()); // later ones are not in the run
+                }
+                if due {
+                    self.note(e, end.clone());
+                }
+            }
+        }
+        for end in &ends {
+            self.found.stopped_at[end.step.member - self.first] = end.t;
+        }
+        ends.into_iter().map(|Located { step, t, state, .. }| Stop { step, t, state }).collect()
+    }
+
+    /// Counts one, and keeps it if it is among the first.
+    fn note(&mut self, e: usize, one: Located) {
+        let count = self.count(e, one.step.member);
+        *count += 1;
+        if *count <= self.motion.events.events[e].most {
+            self.keep(e, one);
+        }
+    }
+
+    fn keep(&mut self, e: usize, one: Located) {
+        let kept = &mut self.found.occurrences[e];
+        kept.member.push(one.step.member as i64);
+        kept.step.push(one.step.number);
+        kept.share.push(one.share);
+        kept.t.push(one.t);
+        kept.states.extend(one.state);
+    }
+
+    /// Locates what waits.
+    fn locate_waiting(&mut self, e: usize) {
+        let candidates = std::mem::take(&mut self.candidates[e]);
+        let mut changes = std::mem::take(&mut self.changes[e]);
+        for change in self.within(e, candidates) {
+            let count = self.count(e, change.step.member);
+            *count += 1;
+            if *count <= self.motion.events.events[e].most {
+                changes.push(change);
+            }
+        }
+        for one in self.located(e, changes) {
+            self.keep(e, one);
+        }
+    }
+}
+
+/// The states at shares of steps, and the quantity of an event there.
+fn trial<'s>(
+    motion: &mut Motion,
+    e: usize,
+    asked: &[(usize, f64)],
+    step_of: &dyn Fn(usize) -> &'s Arc<Step>,
+) -> (States, Vec<f64>) {
+    let mut from = States::default();
+    let mut lengths = Vec::with_capacity(asked.len());
+    for (of, share) in asked {
+        let step = step_of(*of);
+        from.push(step.member, step.t, &step.start);
+        lengths.push(share * step.h);
+    }
+    let there = motion.steps(&from, &lengths);
+    let g = motion.quantity(e, &there);
+    (there, g)
+}
+
+/// Whether g may change its sign between two states, once or twice: see `reference/events.py`.
+pub(crate) fn may_change(before: f64, g: f64, next: f64) -> bool {
+    let bend = ((next - g) - (g - before)).abs();
+    let bend = if before.is_nan() { f64::INFINITY } else { REACH * bend };
+    let (size, last) = (next.abs(), g.abs());
+    let is_near = !size.is_nan() && !last.is_nan() && ((size <= bend) | (last <= bend));
+    is_near | ((next > 0.0) != (g > 0.0))
+}

@@ -1,0 +1,274 @@
+//! Events of adaptive steps: quantities are looked at after every attempt, in the lanes.
+
+use std::sync::Arc;
+
+use crate::{
+    events::{
+        evaluation::Filled,
+        motion::{Event, Events, States, Values, finite},
+        search::bends,
+        watch::{Candidates, Step, Stop, Watch, may_change},
+    },
+    group::AdaptiveBatch,
+    step::pace::Pace,
+};
+
+/// What an event needs in the lanes.
+struct Quantity {
+    value: Filled,
+    slope: Option<Filled>,
+    /// The quantity at the state, and after the attempt before; NaN where that is not known. The slope at the state, and
+    /// at the one before.
+    now: Vec<f64>,
+    before: Vec<f64>,
+    slopes: Vec<f64>,
+    slopes_before: Vec<f64>,
+}
+
+/// The quantities of the lanes, and where these stood before an attempt.
+pub(super) struct Looks<'a> {
+    pub(super) watch: Watch<'a>,
+    events: &'a Events<'a>,
+    rates: Filled,
+    quantities: Vec<Quantity>,
+    /// Whether the quantities of a lane are not known, and until which time an earlier run had looked.
+    fresh: Vec<bool>,
+    since: Vec<f64>,
+    /// The times, the lengths of the steps, the numbers of accepted and rejected attempts, and the states before an attempt.
+    t: Vec<f64>,
+    h: Vec<f64>,
+    accepted: Vec<f64>,
+    rejected: Vec<f64>,
+    states: Vec<f64>,
+    /// The lengths of steps over which slopes are.
+    lengths: Vec<f64>,
+    /// The lanes that have just made a step, with their members.
+    made: Vec<(usize, usize)>,
+}
+
+impl<'a> Looks<'a> {
+    pub(super) fn new(events: &'a Events<'a>, lanes: usize) -> Self {
+        let row = || vec![f64::NAN; lanes];
+        let of = |values: &Values| Filled::of_lanes(&values.of, events.level, lanes);
+        let quantity = |event: &Event| Quantity {
+            value: of(&event.quantity),
+            slope: event.slope.as_ref().map(of),
+            now: row(),
+            before: row(),
+            slopes: row(),
+            slopes_before: row(),
+        };
+        Looks {
+            watch: Watch::new(events),
+            events,
+            rates: of(&events.rates),
+            quantities: events.events.iter().map(quantity).collect(),
+            fresh: vec![true; lanes],
+            since: row(),
+            t: row(),
+            h: row(),
+            accepted: row(),
+            rejected: row(),
+            states: Vec::new(),
+            lengths: row(),
+            made: Vec::new(),
+        }
+    }
+
+    /// Takes a member into a lane, which an earlier run looked at until that time.
+    pub(super) fn begin(&mut self, lane: usize, member: usize, since: f64) {
+        for (quantity, event) in self.quantities.iter_mut().zip(&self.events.events) {
+            quantity.value.prepare_lane(&event.quantity.parameters, lane, member);
+            if let (Some(tile), Some(values)) = (&mut quantity.slope, &event.slope) {
+                tile.prepare_lane(&values.parameters, lane, member);
+            }
+        }
+        self.rates.prepare_lane(&self.events.rates.parameters, lane, member);
+        (self.fresh[lane], self.since[lane]) = (true, since);
+    }
+
+    /// The quantities of all lanes.
+    fn find_quantities(&mut self, group: &dyn AdaptiveBatch) {
+        let (n, sign) = (self.events.numbers, self.events.sign);
+        for Quantity { value, .. } in &mut self.quantities {
+            fill(value.row(0), group.row(n), sign);
+            (0..n).for_each(|i| fill(value.row(1 + i), group.row(i), 1.0));
+            value.run();
+        }
+    }
+
+    /// The slopes of these lanes over steps of the present lengths.
+    fn find_slopes(&mut self, group: &dyn AdaptiveBatch, lanes: &[(usize, usize)]) {
+        let (n, sign) = (self.events.numbers, self.events.sign);
+        fill(self.rates.row(0), group.row(n), 1.0);
+        fill(self.rates.row(1), Some(&self.h), 1.0);
+        (0..n).for_each(|i| fill(self.rates.row(2 + i), group.row(i), 1.0));
+        self.rates.run();
+        let width = self.h.len();
+        for (e, quantity) in self.quantities.iter_mut().enumerate() {
+            quantity.slopes_before.copy_from_slice(&quantity.slopes);
+            let Some(tile) = &mut quantity.slope else {
+                let mut at = States::default();
+                for (lane, member) in lanes {
+                    let state: Vec<f64> = (0..n).map(|i| group.row(i).map_or(f64::NAN, |row| row[*lane])).collect();
+                    at.push(*member, group.row(n).map_or(f64::NAN, |row| row[*lane]), &state);
+                }
+                let lengths: Vec<f64> = lanes.iter().map(|(lane, _)| self.h[*lane]).collect();
+                for ((lane, _), slope) in lanes.iter().zip(self.watch.motion.slopes(e, &at, &lengths)) {
+                    quantity.slopes[*lane] = slope;
+                }
+                continue;
+            };
+            fill(tile.row(0), group.row(n), sign);
+            (0..n).for_each(|i| fill(tile.row(1 + i), group.row(i), 1.0));
+            fill(tile.row(n + 1), Some(&self.h), sign);
+            for i in 0..n {
+                fill(tile.row(n + 2 + i), Some(&self.rates.values[i * width..(i + 1) * width]), 1.0);
+            }
+            tile.run();
+            for (lane, _) in lanes {
+                quantity.slopes[*lane] = finite(tile.values[*lane]);
+            }
+        }
+    }
+
+    /// Notes where the lanes stand before an attempt.
+    pub(super) fn before(&mut self, group: &dyn AdaptiveBatch, member: impl Fn(usize) -> Option<usize>) {
+        let n = self.events.numbers;
+        let places = Pace::of(std::array::from_fn(|i| (n + i) as f64));
+        let row = |place: f64| group.row(place as usize).unwrap_or_default();
+        let wall = row(places.wall);
+        fill(&mut self.t, Some(row(places.t)), 1.0);
+        for (lane, h) in self.h.iter_mut().enumerate() {
+            *h = length(self.t[lane], row(places.h)[lane], wall[lane]);
+        }
+        fill(&mut self.accepted, Some(row(places.accepted)), 1.0);
+        fill(&mut self.rejected, Some(row(places.rejected)), 1.0);
+        self.states.clear();
+        (0..n).for_each(|i| self.states.extend_from_slice(group.row(i).unwrap_or_default()));
+        if !self.fresh.contains(&true) {
+            return;
+        }
+        let is_fresh = |lane: usize| member(lane).filter(|_| self.fresh[lane]).map(|member| (lane, member));
+        let fresh: Vec<_> = (0..self.fresh.len()).filter_map(is_fresh).collect();
+        if fresh.is_empty() {
+            return;
+        }
+        self.find_quantities(group);
+        self.find_slopes(group, &fresh);
+        for (lane, _) in fresh {
+            for quantity in &mut self.quantities {
+                (quantity.now[lane], quantity.before[lane]) = (quantity.value.values[lane], f64::NAN);
+            }
+            (self.fresh[lane], self.lengths[lane]) = (false, self.h[lane]);
+        }
+    }
+
+    /// Looks for events in the steps that lanes have made since; `end` is where a member ends.
+    pub(super) fn after(
+        &mut self,
+        group: &dyn AdaptiveBatch,
+        member: impl Fn(usize) -> Option<usize>,
+        end: impl Fn(usize) -> f64,
+    ) -> Vec<(usize, Stop)> {
+        let n = self.events.numbers;
+        let places = Pace::of(std::array::from_fn(|i| (n + i) as f64));
+        let row = |place: f64| group.row(place as usize).unwrap_or_default();
+        let mut made = std::mem::take(&mut self.made);
+        made.clear();
+        for lane in 0..self.t.len() {
+            let Some(member) = member(lane) else { continue };
+            if row(places.accepted)[lane] > self.accepted[lane] {
+                made.push((lane, member));
+            } else if row(places.rejected)[lane] > self.rejected[lane] {
+                self.quantities.iter_mut().for_each(|quantity| quantity.before[lane] = quantity.now[lane]);
+            }
+        }
+        let mut candidates = Vec::new();
+        if !made.is_empty() {
+            self.find_quantities(group);
+            self.find_slopes(group, &made);
+        }
+        for (lane, member) in made.iter().copied() {
+            let mut events = Vec::new();
+            let stretched = self.h[lane] / self.lengths[lane];
+            self.lengths[lane] = self.h[lane];
+            for (e, quantity) in self.quantities.iter_mut().enumerate() {
+                let (before, g, next) = (quantity.before[lane], quantity.now[lane], quantity.value.values[lane]);
+                let slopes = [quantity.slopes_before[lane] * stretched, quantity.slopes[lane]];
+                if may_change(before, g, next) || bends([g, next], slopes) {
+                    events.push((e, [g, next]));
+                }
+                (quantity.before[lane], quantity.now[lane]) = (g, next);
+            }
+            if events.is_empty() {
+                continue;
+            }
+            let start = self.states.iter().skip(lane).step_by(self.t.len()).copied().collect();
+            let state = (0..n).map(|i| row(i as f64)[lane]).collect();
+            let window = self.window(lane, row(places.t)[lane], end(member));
+            let number = self.accepted[lane] as i64;
+            let step = Step { member, number, t: self.t[lane], h: self.h[lane], start, end: state, window };
+            candidates.push((lane, Candidates { step: Arc::new(step), events }));
+        }
+        self.made = made;
+        self.take(candidates)
+    }
+
+    /// Between which times events count of a step that goes beyond the end, or began before this run; none of others.
+    fn window(&self, lane: usize, t: f64, end: f64) -> Option<[f64; 2]> {
+        (t > end || self.t[lane] < self.since[lane]).then_some([self.since[lane], end])
+    }
+
+    fn take(&mut self, candidates: Vec<(usize, Candidates)>) -> Vec<(usize, Stop)> {
+        if candidates.is_empty() {
+            return Vec::new();
+        }
+        let (lanes, candidates): (Vec<usize>, Vec<Candidates>) = candidates.into_iter().unzip();
+        let members: Vec<usize> = candidates.iter().map(|each| each.step.member).collect();
+        let lane_of = |member: usize| members.iter().position(|each| *each == member).map_or(0, |i| lanes[i]);
+        self.watch.take(candidates).into_iter().map(|stop| (lane_of(stop.step.member), stop)).collect()
+    }
+
+    /// Looks for events in a step that a lane holds, which is in the run only in part.
+    pub(super) fn held(
+        &mut self,
+        group: &dyn AdaptiveBatch,
+        lane: usize,
+        member: usize,
+        pace: &Pace<f64>,
+        end: f64,
+    ) -> Option<Stop> {
+        let (start, h) = (group.state(lane), length(pace.t, pace.h, pace.wall));
+        let mut from = States::default();
+        from.push(member, pace.t, &start);
+        let motion = &mut self.watch.motion;
+        let there = motion.steps(&from, &[h]);
+        let mut events = Vec::new();
+        for (e, quantity) in self.quantities.iter().enumerate() {
+            let [g, next] = [&from, &there].map(|at| motion.quantity(e, at)[0]);
+            let slopes = [&from, &there].map(|at| motion.slopes(e, at, &[h])[0]);
+            let before = if self.fresh[lane] { f64::NAN } else { quantity.before[lane] };
+            if may_change(before, g, next) || bends([g, next], slopes) {
+                events.push((e, [g, next]));
+            }
+        }
+        if events.is_empty() {
+            return None;
+        }
+        let window = Some([self.since[lane], end]);
+        let number = pace.accepted as i64;
+        let step = Step { member, number, t: pace.t, h, start, end: there.numbers, window };
+        self.take(vec![(lane, Candidates { step: Arc::new(step), events })]).pop().map(|(_, stop)| stop)
+    }
+}
+
+/// How long a step is that ends at the wall if it would cross it.
+pub(super) fn length(t: f64, h: f64, wall: f64) -> f64 {
+    if wall < t + h { wall - t } else { h }
+}
+
+/// Copies a row, times a sign.
+fn fill(to: &mut [f64], from: Option<&[f64]>, sign: f64) {
+    to.iter_mut().zip(from.unwrap_or_default()).for_each(|(to, from)| *to = sign * from);
+}

@@ -1,0 +1,290 @@
+//! Events of fixed steps: the states after all steps of a group are looked at, some steps at a time.
+
+use std::sync::Arc;
+
+use crate::{
+    events::{
+        evaluation::Filled,
+        motion::Event,
+        watch::{Candidates, Noticed, Step, Stop, Watch, may_change},
+    },
+    group::Group,
+    model::spec::Spec,
+    tape::real::Real,
+};
+
+/// So many steps are made at a time: their states stay in a cache.
+const STEPS_AT_ONCE: i64 = 64;
+
+/// Where the steps notice what may occur, so many are made at a time, at first and at least and at most. If more than this many
+/// steps of each member would be repeated, half as many; if less than a fourth of it, twice as many.
+const NOTICED_AT_FIRST: i64 = 16;
+const NOTICED_AT_ONCE: [i64; 2] = [8, 256];
+const MOST_AGAIN: usize = 2;
+
+/// The quantities of a group while it is stepped.
+pub(super) struct Looks<'w, 'a, T> {
+    watch: &'w mut Watch<'a>,
+    /// Of each event.
+    tiles: Vec<Filled>,
+    /// Its quantity at the state, and one step before; NaN where that is not known.
+    now: Vec<Vec<f64>>,
+    before: Vec<Vec<f64>>,
+    /// The states before each of some steps and after the last, v before y, in rows of lanes.
+    states: Vec<T>,
+    carried: Vec<T>,
+    /// Whether the quantities of the present state are known.
+    begun: bool,
+    /// Whether the steps themselves notice whether an event may occur, and how many of these are made at a time.
+    notices: bool,
+    together: i64,
+    /// Where members stopped.
+    stops: Vec<Option<Stop>>,
+}
+
+impl<'w, 'a, T> Looks<'w, 'a, T> {
+    /// For so many members from `first` on.
+    pub(super) fn new(watch: &'w mut Watch<'a>, notices: bool, lanes: usize, first: usize, count: usize) -> Self {
+        let mut tiles = watch.motion.in_lanes(lanes);
+        for (tile, Event { quantity, .. }) in tiles.iter_mut().zip(&watch.motion.events.events) {
+            tile.prepare(&quantity.parameters, first, count);
+        }
+        let rows = || vec![vec![f64::NAN; lanes]; tiles.len()];
+        let (now, before) = (rows(), rows());
+        let stops = (0..count).map(|_| None).collect();
+        Looks {
+            watch,
+            now,
+            before,
+            tiles,
+            states: Vec::new(),
+            carried: Vec::new(),
+            begun: false,
+            notices,
+            together: NOTICED_AT_FIRST,
+            stops,
+        }
+    }
+}
+
+/// A step of a lane in which an event may occur: its number among those that were made together, and the quantity at both ends.
+struct Seen {
+    lane: usize,
+    row: usize,
+    event: usize,
+    g: [f64; 2],
+}
+
+/// Members that are stepped together, and how.
+pub(super) struct Stepped<'s, T: Real> {
+    pub(super) group: &'s mut dyn Group<T>,
+    /// The v slot holds something else than v between steps.
+    pub(super) carries: bool,
+    pub(super) spec: &'s Spec<'s>,
+    pub(super) first: usize,
+    pub(super) count: usize,
+    pub(super) h: f64,
+    /// The first step of each that is not finite, or −1.
+    pub(super) first_bad: &'s [i64],
+}
+
+impl<T: Real> Stepped<'_, T> {
+    /// How many numbers of a member each slot has.
+    fn rows(&self) -> (usize, usize) {
+        let (lanes, (v, y)) = (self.group.lanes(), self.group.slots());
+        (v.len() / lanes, y.len() / lanes)
+    }
+}
+
+impl<T: Real> Looks<'_, '_, T> {
+    /// Where members stopped.
+    pub(super) fn stops(&self) -> &[Option<Stop>] {
+        &self.stops
+    }
+
+    /// Makes steps, and looks for events in them.
+    pub(super) fn advance(&mut self, on: &mut Stepped<T>, mut k: i64, steps: i64) {
+        let until = k + steps;
+        while k < until && self.stops.iter().any(Option::is_none) {
+            let noticing = self.notices && self.begun;
+            let most = if noticing {
+                self.together
+            } else if self.notices {
+                1
+            } else {
+                STEPS_AT_ONCE
+            };
+            let n = (until - k).min(most);
+            if noticing {
+                self.make_and_notice(on, k, n);
+            } else {
+                self.make_steps(on, k, n);
+                self.look(on, k, n as usize);
+                self.begin_to_notice(on);
+            }
+            k += n;
+        }
+    }
+
+    /// What is noticed begins with the quantities at the present state and one step before.
+    fn begin_to_notice(&mut self, on: &mut Stepped<T>) {
+        if !self.notices {
+            return;
+        }
+        let (lanes, tally) = (on.group.lanes(), on.group.tally_mut());
+        let first = tally.len() - (2 * self.now.len() + 1) * lanes;
+        for (rows, (before, now)) in tally[first..].chunks_exact_mut(2 * lanes).zip(self.before.iter().zip(&self.now)) {
+            rows.iter_mut().zip(before.iter().chain(now)).for_each(|(to, number)| *to = T::of(*number));
+        }
+    }
+
+    /// Makes steps that notice whether an event may occur in them.
+    fn make_and_notice(&mut self, on: &mut Stepped<T>, k: i64, n: i64) {
+        let lanes = on.group.lanes();
+        let rows = 2 * self.now.len() * lanes;
+        let tally = on.group.tally_mut();
+        let first_row = tally.len() - lanes - rows;
+        tally[first_row + rows..].fill(T::default());
+        self.states.clear();
+        self.states.extend_from_slice(&tally[first_row..first_row + rows]);
+        let (v, y) = on.group.slots();
+        self.states.extend_from_slice(v);
+        self.states.extend_from_slice(y);
+        on.group.advance(k, n);
+        let may = &on.group.tally()[first_row + rows..][..on.count];
+        if may.iter().all(|may| *may == T::default()) {
+            self.together = (self.together * 2).min(NOTICED_AT_ONCE[1]);
+            return;
+        }
+        let (first, h, events) = (on.first, on.h, self.watch.motion.events);
+        let mut noticed = Vec::new();
+        for lane in (0..on.count).filter(|lane| may[*lane] != T::default()) {
+            if self.stops[lane].is_some() || on.first_bad[lane] >= 0 {
+                continue;
+            }
+            let numbers = |from: usize, every: usize| {
+                self.states[from * lanes..].iter().skip(lane).step_by(every * lanes).map(|x| x.wide())
+            };
+            let (member, events_of_step) = (first + lane, self.now.len());
+            noticed.push(Noticed {
+                member,
+                number: k,
+                begin: events.begin.at(member),
+                h,
+                before: numbers(0, 2).take(events_of_step).collect(),
+                start: numbers(2 * events_of_step, 1).collect(),
+                until: k + n,
+            });
+        }
+        // Where few have one, more steps are made together, which then takes less time than to repeat those of these few.
+        let share = noticed.len() * n as usize;
+        if share > on.count * MOST_AGAIN {
+            self.together = (self.together / 2).max(NOTICED_AT_ONCE[0]);
+        } else if share < on.count * MOST_AGAIN / 4 {
+            self.together = (self.together * 2).min(NOTICED_AT_ONCE[1]);
+        }
+        for stop in self.watch.notice(noticed) {
+            let lane = stop.step.member - first;
+            self.stops[lane] = Some(stop);
+        }
+    }
+
+    /// Makes steps and keeps the states before each and after the last.
+    fn make_steps(&mut self, on: &mut Stepped<T>, k: i64, n: i64) {
+        self.states.clear();
+        let unrolled = on.group.unrolled(on.spec, on.first, on.count);
+        let (mut at, lanes) = (k, on.group.lanes());
+        let (p, q) = on.rows();
+        while at < k + n {
+            let steps = unrolled as i64;
+            if unrolled > 0 && at % steps == 0 && at + steps <= k + n {
+                let (v, y) = on.group.advance_unrolled(at).split_at(unrolled * p * lanes);
+                for step in 0..unrolled {
+                    self.states.extend_from_slice(&v[step * p * lanes..(step + 1) * p * lanes]);
+                    self.states.extend_from_slice(&y[step * q * lanes..(step + 1) * q * lanes]);
+                }
+                at += steps;
+            } else {
+                self.keep_state(on, at);
+                on.group.advance(at, 1);
+                at += 1;
+            }
+        }
+        self.keep_state(on, k + n);
+    }
+
+    fn keep_state(&mut self, on: &mut Stepped<T>, k: i64) {
+        if on.carries {
+            self.carried.clear();
+            self.carried.extend_from_slice(on.group.slots().0);
+            on.group.finish(k);
+        }
+        let (v, y) = on.group.slots();
+        self.states.extend_from_slice(v);
+        self.states.extend_from_slice(y);
+        if on.carries {
+            on.group.slots_mut().0.copy_from_slice(&self.carried);
+        }
+    }
+
+    /// Looks for events in the steps that were made.
+    fn look(&mut self, on: &mut Stepped<T>, k: i64, steps: usize) {
+        let lanes = on.group.lanes();
+        let (p, q) = on.rows();
+        let block = (p + q) * lanes;
+        let (first, h, events) = (on.first, on.h, self.watch.motion.events);
+        let mut seen = Vec::new();
+        for row in 0..=steps {
+            let since = (k + row as i64) as f64 * h;
+            for (event, tile) in self.tiles.iter_mut().enumerate() {
+                if row == 0 && self.begun {
+                    continue;
+                }
+                tile.row(0).iter_mut().enumerate().for_each(|(lane, t)| {
+                    *t = events.sign * (events.begin.at(first + lane.min(on.count - 1)) + since);
+                });
+                for (i, numbers) in self.states[row * block..(row + 1) * block].chunks_exact(lanes).enumerate() {
+                    let row = tile.row(1 + i);
+                    row.iter_mut().zip(numbers).for_each(|(x, number)| *x = number.wide());
+                }
+                tile.run();
+                let (now, before) = (&mut self.now[event], &mut self.before[event]);
+                let g = &tile.values[..lanes];
+                if row > 0 && (0..lanes).fold(false, |any, lane| any | may_change(before[lane], now[lane], g[lane])) {
+                    let may = |lane: &usize| may_change(before[*lane], now[*lane], g[*lane]);
+                    let flagged = (0..on.count).filter(may);
+                    seen.extend(flagged.map(|lane| Seen { lane, row: row - 1, event, g: [now[lane], g[lane]] }));
+                }
+                if row > 0 {
+                    before.copy_from_slice(now);
+                }
+                now.copy_from_slice(g);
+            }
+        }
+        self.begun = true;
+        if seen.is_empty() {
+            return;
+        }
+        seen.sort_by_key(|each| (each.lane, each.row));
+        let state = |lane: usize, row: usize| -> Vec<f64> {
+            self.states[row * block..(row + 1) * block].iter().skip(lane).step_by(lanes).map(|x| x.wide()).collect()
+        };
+        let mut candidates = Vec::new();
+        for each in seen.chunk_by(|a, b| (a.lane, a.row) == (b.lane, b.row)) {
+            let (lane, row) = (each[0].lane, each[0].row);
+            let (start, end) = (state(lane, row), state(lane, row + 1));
+            let is_finite = start.iter().chain(&end).all(|x| x.is_finite());
+            if !is_finite || self.stops[lane].is_some() || on.first_bad[lane] >= 0 {
+                continue;
+            }
+            let (member, number) = (first + lane, k + row as i64);
+            let step = Step { member, number, t: events.begin.at(member) + number as f64 * h, h, start, end, window: None };
+            let events = each.iter().map(|seen| (seen.event, seen.g)).collect();
+            candidates.push(Candidates { step: Arc::new(step), events });
+        }
+        for stop in self.watch.take(candidates) {
+            let lane = stop.step.member - first;
+            self.stops[lane] = Some(stop);
+        }
+    }
+}

@@ -1,0 +1,117 @@
+//! The events of a run: tapes and parameters that stay Python's, and what was found.
+
+use std::sync::{Mutex, PoisonError};
+
+use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1};
+use pyo3::prelude::*;
+use stepwell_core::{
+    events::{
+        found::Found,
+        motion::{self, Events},
+    },
+    isa::Level,
+    model::spec::Row,
+};
+
+use crate::{
+    model::{argument_error, core_error},
+    tape::Evaluation,
+};
+
+/// Values of a tape, with their parameters: see `Values` in `runs/events/by_core.py`.
+#[derive(FromPyObject)]
+struct ValuesOf<'py> {
+    of: Bound<'py, Evaluation>,
+    parameters: Vec<PyReadonlyArray1<'py, f64>>,
+}
+
+/// An event: see `OfCore` there.
+#[derive(FromPyObject)]
+struct EventOf<'py> {
+    quantity: ValuesOf<'py>,
+    slope: Option<ValuesOf<'py>>,
+    direction: f64,
+    terminal: i64,
+    most: i64,
+}
+
+/// All events of a run: see `Sought` there.
+#[derive(FromPyObject)]
+pub(crate) struct EventsOf<'py> {
+    events: Vec<EventOf<'py>>,
+    step: ValuesOf<'py>,
+    rates: ValuesOf<'py>,
+    numbers: usize,
+    begin: PyReadonlyArray1<'py, f64>,
+    sign: f64,
+}
+
+/// A row of one number for all members, or one for each.
+fn row<'a>(numbers: &'a PyReadonlyArray1<'_, f64>, members: usize) -> PyResult<Row<'a>> {
+    let numbers = numbers.as_slice()?;
+    if numbers.len() != 1 && numbers.len() != members {
+        return Err(argument_error(format!("expected one number or {members}, got {}", numbers.len())));
+    }
+    Ok(Row(numbers))
+}
+
+impl ValuesOf<'_> {
+    fn of_core(&self, members: usize) -> PyResult<motion::Values<'_>> {
+        let parameters = self.parameters.iter().map(|numbers| row(numbers, members)).collect::<PyResult<_>>()?;
+        Ok(motion::Values { of: self.of.get().0.clone(), parameters })
+    }
+}
+
+impl EventsOf<'_> {
+    /// As the core takes them.
+    pub(crate) fn of_core(&self, members: usize) -> PyResult<Events<'_>> {
+        let events = self
+            .events
+            .iter()
+            .map(|event| {
+                Ok(motion::Event {
+                    quantity: event.quantity.of_core(members)?,
+                    slope: event.slope.as_ref().map(|slope| slope.of_core(members)).transpose()?,
+                    direction: event.direction,
+                    terminal: event.terminal,
+                    most: event.most,
+                })
+            })
+            .collect::<PyResult<Vec<_>>>()?;
+        let found = Mutex::new(Found::new(events.len(), members));
+        Ok(Events {
+            events,
+            step: self.step.of_core(members)?,
+            rates: self.rates.of_core(members)?,
+            numbers: self.numbers,
+            begin: row(&self.begin, members)?,
+            sign: self.sign,
+            level: Level::choose().map_err(|unknown| core_error(unknown.into()))?,
+            found,
+        })
+    }
+}
+
+/// An array of whole numbers, or of others.
+type Whole = Py<PyArray1<i64>>;
+type Real = Py<PyArray1<f64>>;
+/// Of each event the members, steps, shares, times and states of its occurrences; how many each member has; when members stopped;
+/// whether a saved time changed their steps.
+pub(crate) type AllFound = (Vec<(Whole, Whole, Real, Real, Real)>, Whole, Real, Py<PyArray1<bool>>);
+
+/// What was found.
+pub(crate) fn found(py: Python<'_>, events: &Events) -> AllFound {
+    let mut found = events.found.lock().unwrap_or_else(PoisonError::into_inner);
+    let Found { occurrences, counts, stopped_at, other_steps } = std::mem::take(&mut *found);
+    let of_each = occurrences.into_iter().map(|each| {
+        (
+            each.member.into_pyarray(py).unbind(),
+            each.step.into_pyarray(py).unbind(),
+            each.share.into_pyarray(py).unbind(),
+            each.t.into_pyarray(py).unbind(),
+            each.states.into_pyarray(py).unbind(),
+        )
+    });
+    let (counts, stopped_at) = (counts.into_pyarray(py).unbind(), stopped_at.into_pyarray(py).unbind());
+    (of_each.collect(), counts, stopped_at, other_steps.into_pyarray(py).unbind())
+}
