@@ -14,7 +14,7 @@ from stepwell.views import cli
 from stepwell.views.explorer import data as of_page
 from stepwell.views.explorer import sliders
 from stepwell.views.explorer.data import of_scene
-from stepwell.views.explorer.page import MODULES, WEB, script
+from stepwell.views.explorer.page import IF_NAMED, MODULES, WEB, script
 from support.cases import SOME
 from support.explored import CHANGED, STEPS, data_of, expected, in_node, needs_node, page, races, scene_of
 from support.refusals import refused
@@ -33,7 +33,7 @@ def test_every_step_has_the_bits_of_integrate(some: int | None, tmp_path: Path) 
     """Each scene by methods that can step it; and with sliders moved, against the scene made with these parameters."""
     every = races(some)
     assert {name for name, *_ in every} == set(sliders.OFFERS)
-    assert {key for _, key, *_ in every} == {m.name for m in sw.methods()}
+    assert {key for _, key, *_ in every} == {m.name for m in sw.methods()} - set(IF_NAMED)
     results = in_node(RUN, tmp_path, [[name, key, values, STEPS] for name, key, values, _ in every])
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
@@ -215,7 +215,7 @@ def test_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeyp
     assert (report["written"], report["bytes"]) == ([str(path)], path.stat().st_size)
     (scene,) = report["scenes"]
     assert (scene["name"], scene["sliders"]) == ("pendulum", ["omega", "start", "push"])
-    assert set(scene["methods"]) == {m.name for m in sw.methods()}
+    assert set(scene["methods"]) == {m.name for m in sw.methods()} - set(IF_NAMED)
     assert "Pendulum, 90" in path.read_text(encoding="utf-8")
     opened: list[str] = []
     monkeypatch.setattr("webbrowser.open", opened.append)
@@ -226,6 +226,6 @@ def test_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeyp
     out = capsys.readouterr().out
     assert out.startswith(f"opened in the browser: {file}\n")
     (row,) = [line for line in out.splitlines() if line.startswith("oscillator")]
-    assert row.split() == ["oscillator", str(len(sw.methods())), "Undamped", "oscillator", "omega,", "start"]
+    assert row.split() == ["oscillator", str(len(sw.methods()) - len(IF_NAMED)), "Undamped", "oscillator", "omega,", "start"]
     assert cli.main(["explore", "--scene", "nothing"]) == 2
     assert "nothing" in capsys.readouterr().err

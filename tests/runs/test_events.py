@@ -388,7 +388,7 @@ def check_what_comes_after_a_terminal_event_is_not_computed(method: str, monkeyp
     adapt = engine.adapt
     ten = sw.Event(lambda t, y: y - 10.0, terminal=True, name="ten")
     with monkeypatch.context() as patch:
-        patch.setattr(engine, "adapt", lambda *arguments: results.append(adapt(*arguments)) or results[-1])
+        patch.setattr(engine, "adapt", lambda *arguments, **named: results.append(adapt(*arguments, **named)) or results[-1])
         run = sw.integrate(growing(), method, y=1.0, tolerance=1e-8, at=[0.5, 2.0], events=ten)
     # The relative error of y is within some 100 tolerances, and y passes 10 at a speed of 100: δt = 0.1·δy/y.
     assert abs(run.stopped_at - 0.9) < (1e-5 if sw.method(method).order == 2 else 1e-7)

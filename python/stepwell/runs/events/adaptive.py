@@ -117,7 +117,7 @@ class _Driver(Collected):
     def looked_again(self, out: engine.Adapted, paces: Array, v: Array, y: Array) -> engine.Adapted:
         """A run by the core, with the events of the steps that it would have without saved times.
 
-        An extra step to a saved time whose error is not tolerated makes the next steps shorter: of such members they are found here.
+        An extra step to a saved time with too large an error makes the next steps shorter; of such members events are found here.
         """
         if not (others := np.flatnonzero(self.other_steps)).size:
             return out
@@ -141,7 +141,8 @@ class _Driver(Collected):
             self.since = np.where(rows[engine.HELD] > 0.0, rows[engine.TARGET], -np.inf)
             self.begin = rows[engine.TIME]
         self.cover(self.begin, self.end)
-        self.look(index, rows[:, index], *(block[..., index] for block in blocks), self.pacing.begins)
+        v, y = (block[..., index] for block in blocks)
+        self.look(index, rows[:, index], v, y, self.pacing.begins)
 
     def look(self, index: Whole, paces: Array, v: Array, y: Array, begins: bool) -> None:
         """Find the events of some members, from where they stand."""
