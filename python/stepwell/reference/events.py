@@ -157,7 +157,10 @@ def parted(look: Look, parts: Parts) -> tuple[Parts, Whole]:
         g, slope, v, y = look(parts.of, middle)
         first_half = parts._replace(high=middle, g_high=g, slope_high=slope, v=v, y=y)
         lies = (parts.g_low == 0.0) & (g == 0.0) & (slope == 0.0)  # it has not left zero yet, and is on the same side
-        parts = joined([first_half, parts._replace(low=middle, g_low=g, slope_low=np.where(lies, parts.slope_low, slope))])
+        # Zero at the ends and between them, it stays: so does the place of a body at rest in a step of Standard Euler.
+        moves = (parts.g_low != 0.0) | (g != 0.0) | (parts.g_high != 0.0)
+        second_half = parts._replace(low=middle, g_low=g, slope_low=np.where(lies, parts.slope_low, slope))
+        parts = joined([first_half.some(moves), second_half.some(moves)])
     once = joined(brackets)
     return once.some(np.lexsort((once.high, once.of))), stuck
 

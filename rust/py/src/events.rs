@@ -6,7 +6,7 @@ use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
 use stepwell_core::{
     events::{
-        found::Found,
+        found::{Found, Rest},
         motion::{self, Events},
     },
     isa::Level,
@@ -30,6 +30,7 @@ struct ValuesOf<'py> {
 struct EventOf<'py> {
     quantity: ValuesOf<'py>,
     slope: Option<ValuesOf<'py>>,
+    then: Option<ValuesOf<'py>>,
     direction: f64,
     terminal: i64,
     most: i64,
@@ -72,6 +73,7 @@ impl EventsOf<'_> {
                 Ok(motion::Event {
                     quantity: event.quantity.of_core(members)?,
                     slope: event.slope.as_ref().map(|slope| slope.of_core(members)).transpose()?,
+                    then: event.then.as_ref().map(|then| then.of_core(members)).transpose()?,
                     direction: event.direction,
                     terminal: event.terminal,
                     most: event.most,
@@ -95,14 +97,17 @@ impl EventsOf<'_> {
 /// An array of whole numbers, or of others.
 type Whole = Py<PyArray1<i64>>;
 type Real = Py<PyArray1<f64>>;
+/// Of members at rest their numbers, those of their events, whether these lead them back, since when the state was changed as often
+/// as it may be, and which events set each other off.
+type Rests = Vec<(i64, i64, bool, f64, Vec<bool>)>;
 /// Of each event the members, steps, shares, times and states of its occurrences; how many each member has; when members stopped;
-/// whether a saved time changed their steps.
-pub(crate) type AllFound = (Vec<(Whole, Whole, Real, Real, Real)>, Whole, Real, Py<PyArray1<bool>>);
+/// whether a saved time changed their steps; the members at rest.
+pub(crate) type AllFound = (Vec<(Whole, Whole, Real, Real, Real)>, Whole, Real, Py<PyArray1<bool>>, Rests);
 
 /// What was found.
 pub(crate) fn found(py: Python<'_>, events: &Events) -> AllFound {
     let mut found = events.found.lock().unwrap_or_else(PoisonError::into_inner);
-    let Found { occurrences, counts, stopped_at, other_steps } = std::mem::take(&mut *found);
+    let Found { occurrences, counts, stopped_at, other_steps, rests } = std::mem::take(&mut *found);
     let of_each = occurrences.into_iter().map(|each| {
         (
             each.member.into_pyarray(py).unbind(),
@@ -113,5 +118,6 @@ pub(crate) fn found(py: Python<'_>, events: &Events) -> AllFound {
         )
     });
     let (counts, stopped_at) = (counts.into_pyarray(py).unbind(), stopped_at.into_pyarray(py).unbind());
-    (of_each.collect(), counts, stopped_at, other_steps.into_pyarray(py).unbind())
+    let of_rest = |rest: Rest| (rest.member, rest.event, rest.led_back, rest.often_since, rest.circle);
+    (of_each.collect(), counts, stopped_at, other_steps.into_pyarray(py).unbind(), rests.into_iter().map(of_rest).collect())
 }

@@ -14,6 +14,7 @@ from .collected import Collected
 from .evaluated import Evaluated
 from .parts import Located
 from .timed import Timed
+from .traced import NewState
 
 
 class Values(NamedTuple):
@@ -24,10 +25,11 @@ class Values(NamedTuple):
 
 
 class OfCore(NamedTuple):
-    """An event: its quantity and the slope of that, None if it has no derivative, as values."""
+    """An event: its quantity, the slope of that, None if it has no derivative, and the new state, None without one, as values."""
 
     quantity: Values
     slope: Values | None
+    then: Values | None
     direction: float
     terminal: int
     most: int
@@ -53,8 +55,11 @@ class Sought(NamedTuple):
     sign: float
 
 
-def sought(search: Collected) -> Sought | None:
-    """What the core is to look for; None where a part of it is no tape for numbers of 64 bits, as of many bodies."""
+def sought(search: Collected, new_states: dict[int, NewState] | None = None) -> Sought | None:
+    """What the core is to look for; None where a part of it is no tape for numbers of 64 bits, as of many bodies.
+
+    ``new_states`` are those that events give members, by the numbers of these.
+    """
     plan = search.plan
     is_plain = bool(search.events) and plan.backend == "rust" and plan.device is None and not (plan.single or plan.fused)
     if not is_plain or plan.system.controller is not None or plan.system.mass_matrix is not None:
@@ -63,16 +68,18 @@ def sought(search: Collected) -> Sought | None:
     if step is None or rates is None:
         return None
     events = []
-    for event, quantity in zip(search.events, search.quantities, strict=True):
+    for e, (event, quantity) in enumerate(zip(search.events, search.quantities, strict=True)):
         if isinstance(quantity, Timed):  # its times are known
             return None
         numbers = quantity.numbers(search.members.parameters)
         value, slope = quantity.evaluated
         of_slope = None if slope is None else _values(slope, numbers)
         of_value = _values(value, numbers)
-        if of_value is None or (slope is not None and of_slope is None):
+        then = (new_states or {}).get(e)
+        of_then = None if then is None else _values(then.evaluated, then.numbers(search.members.parameters))
+        if of_value is None or (slope is not None and of_slope is None) or (then is not None and of_then is None):
             return None
-        events.append(OfCore(of_value, of_slope, float(event.direction), int(event.terminal), event.most))
+        events.append(OfCore(of_value, of_slope, of_then, float(event.direction), int(event.terminal), event.most))
     both = [_values(*each) for each in (step, rates)]
     if both[0] is None or both[1] is None:
         return None
@@ -102,7 +109,7 @@ def adapted(search: Collected, sought: Sought, model: _core.ModelSpec, plan: eng
 
 def take(search: Collected, found: Any) -> None:
     """Take what the core found."""
-    of_each, counts, stopped_at, search.other_steps = found
+    of_each, counts, stopped_at, search.other_steps, search.rested = found
     shapes = search.plan.system.v_shape, search.plan.system.y_shape
     n_v, n = prod(shapes[0]), prod(shapes[0]) + prod(shapes[1])
     search.count[...] = counts.reshape(search.count.shape)

@@ -92,6 +92,8 @@ class Collected:
         """Remove all occurrences."""
         #: With adaptive steps by the core: the members whose steps a saved time changed.
         self.other_steps = np.zeros(self.plan.members, dtype=bool)
+        #: Of members at rest, by the core, what ``Resets.rested`` takes.
+        self.rested: list[tuple[int, int, bool, float, list[bool]]] = []
         self.count = np.zeros((len(self.events), self.plan.members), dtype=np.int64)
         self.entries: list[list[Located]] = [[] for _ in self.events]
         self.waiting: list[list[Changes]] = [[] for _ in self.events]

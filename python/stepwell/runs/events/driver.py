@@ -95,13 +95,19 @@ class _Driver(Collected):
         bad = self.first_bad.copy() if before is None else before.reshape(-1)
         size = max(1, NUMBERS_AT_ONCE // numbers)
         self.cover(plan.t0 + plan.first * plan.dt, plan.t0 + (plan.first + plan.steps) * plan.dt)
-        if not any(event.then for event in self.events) and (looked := by_core.sought(self)) is not None:
+        if (looked := self._sought()) is not None:
             return self._by_core(looked, v, y, bad, carried)
+        if not carried:
+            self._begin(v, y)
         for first in range(0, total, size):
             index = np.arange(first, min(first + size, total))
             self._group(index, At(v[..., index], y[..., index], bad[index], carried), size)
         self._rest(size)
         return self._outcome()
+
+    def _sought(self) -> by_core.Sought | None:
+        """What the core looks for; None where it does not."""
+        return by_core.sought(self)
 
     def _by_core(self, sought: by_core.Sought, v: Array, y: Array, bad: Whole, carried: bool) -> engine.Outcome:
         """The run by the core, which looks for the events itself."""
@@ -114,6 +120,9 @@ class _Driver(Collected):
         if plan.progress is not None:
             plan.progress(1.0)
         return out
+
+    def _begin(self, v: Array, y: Array) -> None:
+        """Begin at these states."""
 
     def _rest(self, size: int) -> None:
         """What is left to do of some members."""
@@ -221,13 +230,19 @@ class _Resetting(_Driver):
         #: Members that events let go later: where they are then, and how many steps are made before.
         self.later: list[tuple[Whole, At, int]] = []
 
-    def run(self, v: Array, y: Array, before: Whole | None, carried: bool) -> engine.Outcome:
+    def _sought(self) -> by_core.Sought | None:
+        # What a method carries beside the state is begun anew for all members of a group.
+        return None if self.plan.begins else by_core.sought(self, self.resets.new_states)
+
+    def _by_core(self, sought: by_core.Sought, v: Array, y: Array, bad: Whole, carried: bool) -> engine.Outcome:
+        out = super()._by_core(sought, v, y, bad, carried)
+        self.resets.take(self.rested, self.rests)
+        return out._replace(work=None)
+
+    def _begin(self, v: Array, y: Array) -> None:
         plan = self.plan
-        if not carried:
-            states = v.reshape(*plan.system.v_shape, plan.members), y.reshape(*plan.system.y_shape, plan.members)
-            t = np.broadcast_to(plan.t0 + plan.first * plan.dt, plan.batch).reshape(-1)
-            self.resets.begin(t, np.full(plan.members, plan.dt), *states)
-        return super().run(v, y, before, carried)
+        t = np.broadcast_to(plan.t0 + plan.first * plan.dt, plan.batch).reshape(-1)
+        self.resets.begin(t, np.full(plan.members, plan.dt), v, y)
 
     def _rest(self, size: int) -> None:
         while self.later:

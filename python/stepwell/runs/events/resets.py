@@ -126,7 +126,7 @@ class Resets:
         parameters = run.members.numbers(slice(None))
         #: The direction of time.
         self._run, self._way = run, 1.0 if run.plan.dt > 0.0 else -1.0
-        self._new_states = {
+        self.new_states = {
             e: NewState(event, run.plan.system, parameters, by_core=run.plan.backend == "rust")
             for e, event in enumerate(run.events)
             if event.then is not None
@@ -152,7 +152,7 @@ class Resets:
     def begin_again(self, t: Array, h: Array, v: Array, y: Array, g: list[Array], changed: list[Any], moved: Any) -> None:
         """``begin`` for members that were moved, with their quantities, and for each event the members whose quantity changed."""
         run = self._run
-        for e, new_state in self._new_states.items():
+        for e, new_state in self.new_states.items():
             there = np.where(g[e] == 0.0, -float(run.events[e].direction), 0.0)
             self.at[e] = np.where(changed[e], there, self.at[e])
             who = np.flatnonzero(moved & ((self.at[e] != 0.0) | (changed[e] & (g[e] == 0.0))))
@@ -166,9 +166,15 @@ class Resets:
                 self.at[e, who] = np.where(self.led_back[e, who], side, self.at[e, who])
             self.lain[e] &= ~changed[e]
 
+    def take(self, rested: list[tuple[int, int, bool, float, list[bool]]], rests: Whole) -> None:
+        """Take which members the core left at rest, at which events, and why."""
+        for member, event, led_back, often_since, circle in rested:
+            rests[member], self.led_back[event, member], self.often_since[member] = event, led_back, often_since
+            self.circles[:, member] = circle
+
     def changes(self, e: int) -> bool:
         """Whether an event changes the state."""
-        return e in self._new_states
+        return e in self.new_states
 
     def within(self, e: int, steps: Changes) -> tuple[Changes, Whole]:
         """As ``Collected.within`` for whole steps, where members may lie at the event; also the steps in which it holds them."""
@@ -187,7 +193,7 @@ class Resets:
 
     def leave(self, member: Whole, t: Array, v: Array, y: Array) -> None:
         """Forget from which side members came that lay at an event and have left it."""
-        for e in self._new_states:
+        for e in self.new_states:
             who = np.flatnonzero(self.lain[e, member])
             if len(who):
                 g = self._run.quantity(e, t[who], v[..., who], y[..., who], self._run.members.numbers(member[who]))
@@ -201,7 +207,7 @@ class Resets:
     def holds(self, rests: Whole, member: Whole, t: Array, h: Array, v: Array, y: Array) -> Any:
         """Which members at rest at these events would be so at these times."""
         holds = rests >= 0
-        for e in self._new_states:
+        for e in self.new_states:
             who = np.flatnonzero((rests == e) & self.led_back[e, member])
             if len(who):
                 state = v[..., who], y[..., who]
@@ -254,13 +260,13 @@ class Resets:
                 due[e, who], acted[e, who] = False, True
                 ends = run.ends(e, member[who])
                 self._note(e, at.some(who)._replace(v=v[..., who], y=y[..., who]))
-                if e not in self._new_states:
+                if e not in self.new_states:
                     side[e, who] = np.sign(g[e, who])
                     stops[who] |= ends
                     continue
                 who = who[~stops[who]]
                 t, state, of_them = at.t[who], (v[..., who], y[..., who]), run.members.numbers(member[who])
-                v[..., who], y[..., who] = self._new_states[e](run.sign * t, *state, of_them)
+                v[..., who], y[..., who] = self.new_states[e](run.sign * t, *state, of_them)
                 event[who], came[e, who] = e, side[e, who]
                 for other in events:
                     last, now = g[other, who], run.quantity(other, t, v[..., who], y[..., who], of_them)
@@ -277,7 +283,7 @@ class Resets:
                 break
         here = np.where(came == 0.0, np.where(g == held, lies, 0.0), np.where(np.abs(g) <= near, came, 0.0))
         self.lain[:, member] = (here != 0.0) & (came == 0.0) & (g == 0.0)
-        for e in self._new_states:
+        for e in self.new_states:
             who = np.flatnonzero(came[e])
             if len(who):
                 old, new = ((each_v[..., who], each_y[..., who]) for each_v, each_y in ((at.v, at.y), (v, y)))
@@ -306,7 +312,7 @@ class Resets:
                 holds &= same.all(axis=tuple(range(same.ndim - 1)))
             v, y = (block + FURTHER * change for block, change in zip(new, rates, strict=True))
             t_further = t + FURTHER * h
-            back = self._new_states[e](run.sign * t_further, v, y, numbers)
+            back = self.new_states[e](run.sign * t_further, v, y, numbers)
             g = run.quantity(e, t, *new, numbers)
             g_further, g_back = (run.quantity(e, t_further, *state, numbers) for state in ((v, y), back))
             across = side * (g - g_further)
@@ -411,7 +417,7 @@ class Resets:
             head = zeros.astype(np.int64), rows, stretch.member, stretch.step, stretch.t, stretch.h, step_end
             whole = Changes(*head, zeros, ones, g, g_end, stretch.v, stretch.y, stretch.v_end, stretch.y_end)
             looked = np.flatnonzero(~((stretch.at[e] != 0.0) & (np.abs(stretch.h) < LEAST_LEFT * step)))
-            if e in self._new_states:
+            if e in self.new_states:
                 lain = self.lain[e, stretch.member]
                 stretch.at[e] = np.where(lain & (g != 0.0), 0.0, stretch.at[e])
                 lies = np.flatnonzero(lain & (stretch.at[e] != 0.0))
@@ -420,11 +426,11 @@ class Resets:
                     state, h = (some.v, some.y), self._way * step[lies]
                     self.led_back[e, some.member] |= self._leads_back(e, some.t, h, state, state, some.member, some.at[e])
             changes, stuck = run.within(e, whole.some(looked), stretch.at[e, looked])
-            if e in self._new_states:
+            if e in self.new_states:
                 returns[looked[stuck]] = e
                 returns[(stretch.at[e] != 0.0) & self.led_back[e, stretch.member]] = e
             occurs = run.located(e, changes)
-            if e in self._new_states:  # in no time
+            if e in self.new_states:  # in no time
                 again = (stretch.at[e, changes.place] != 0.0) & (
                     self._way * (occurs.t - stretch.t[changes.place]) <= NO_TIME * step[changes.place]
                 )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from itertools import count
 from math import prod
 from typing import Any
@@ -30,9 +31,10 @@ from .event import Event
 SHORT = 2.0**-26
 
 
-#: The operations of quantities, and of those that the core watches, and how many of each are remembered.
+#: The operations of quantities, of those that the core watches and of new states, and how many of each are remembered.
 KNOWN: dict[Any, tuple[Evaluated, Evaluated | None, bool]] = {}
 WATCHED: dict[Any, engine.Watched] = {}
+NEW_STATES: dict[Any, Evaluated] = {}
 MOST_KNOWN = 256
 
 
@@ -86,11 +88,9 @@ class Quantity:
         self._n = 1 + self.has_v * prod(self.v_shape) + prod(self.y_shape)
         #: Equal for quantities with the same operations; None if something that the function reads may change unseen.
         self.key: Any = None
-        try:
+        with suppress(Unknown):
             of_function = identity(event.function)
             self.key = (of_function, self.v_shape, self.y_shape, tuple(self._shapes.items()), self._quick_sines, by_core)
-        except Unknown:
-            pass
         known = KNOWN.get(self.key)
         if known is None:
             known = self._trace()
@@ -197,15 +197,29 @@ class NewState:
         self._name, self._function = f"events: {event.name}: then", event.then
         self._shapes = (system.v_shape, system.y_shape) if prod(system.v_shape) > 0 else (system.y_shape,)
         self._parameters = parameters_of(event.then, self._name, system, values)
+        shapes = {name: values[name].shape[:-1] for name in self._parameters}
         quick_sines = bool(getattr(getattr(system, "definition", None), "quick_sines", False))
+        key: Any = None
+        with suppress(Unknown):
+            key = (identity(event.then), self._shapes, tuple(shapes.items()), quick_sines, by_core)
+        #: The new state of a time and a state.
+        self.evaluated = NEW_STATES.get(key) or self._traced(shapes, quick_sines, by_core)
+        if key is not None:
+            remember(NEW_STATES, key, self.evaluated)
+
+    def _traced(self, shapes: dict[str, Any], quick_sines: bool, by_core: bool) -> Evaluated:
         tape = _core.Tape()
         numbers, state = map(tape.param, count()), map(tape.state, count())
         t = next(state)
-        parameters = {name: _symbols(values[name].shape[:-1], numbers) for name in self._parameters}
+        parameters = {name: _symbols(shape, numbers) for name, shape in shapes.items()}
         blocks = [_symbols(shape, state) for shape in self._shapes]
         result = run_function(rebound(self._function), self._name, quick_sines, Scalar(t), *blocks, **parameters)
         flat = [each for block in self._blocks(result) for each in symbols(tape, block)]
-        self._evaluated = Evaluated(tape, flat, 1 + sum(map(prod, self._shapes)), by_core=by_core)
+        return Evaluated(tape, flat, 1 + sum(map(prod, self._shapes)), by_core=by_core)
+
+    def numbers(self, values: dict[str, Any]) -> list[Array]:
+        """The numbers of its parameters, one after the other."""
+        return [each for name in self._parameters for each in _rows(values[name], values[name].shape[:-1])]
 
     def _blocks(self, result: Any) -> list[Any]:
         """The blocks that the function returned, broadcast to their shapes."""
@@ -227,8 +241,7 @@ class NewState:
         """The new states of members, whose axis comes last."""
         blocks = (v, y)[-len(self._shapes) :]
         state = [t, *(row for block, shape in zip(blocks, self._shapes, strict=True) for row in _rows(block, shape))]
-        numbers = [each for name in self._parameters for each in _rows(values[name], values[name].shape[:-1])]
-        results = self._evaluated(state, numbers)
+        results = self.evaluated(state, self.numbers(values))
         new_v, new_y, n = v.copy(), y.copy(), len(results) - prod(self._shapes[-1])
         for block, shape, rows in ((new_v, self._shapes[0], results[:n]), (new_y, self._shapes[-1], results[n:])):
             for index, row in zip(np.ndindex(*shape), rows, strict=False):

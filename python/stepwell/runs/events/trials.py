@@ -157,7 +157,9 @@ class Trials:
             if _core.in_parts(model, plan.members, choice=choice, attempts=self._adaptive) is not None:
                 return None
             key = (_core.tape_number(model, choice=choice, attempts=self._adaptive), what, plan.choice)
-        tracer, sizes = Tracer(plan.system, tape, plan.force), [prod(plan.system.v_shape), prod(plan.system.y_shape)]
+        # Attempts of fused steps fuse what the rates say; steps of one length are made again without.
+        system = plan.stepped if self._adaptive else plan.system
+        tracer, sizes = Tracer(system, tape, plan.force), [prod(system.v_shape), prod(system.y_shape)]
         leaves = map(tape.state, count())
         t, h = next(leaves), next(leaves)
         if key in TRACED:

@@ -139,24 +139,55 @@ const FEW: usize = 3;
 /// So many together are worth the most lanes.
 const MANY: usize = 64;
 
+/// A tile for about so many members, with the parameters that all have in common.
+fn tile_of<'t>(
+    tile: &'t mut Option<Filled>,
+    evaluation: &Evaluation,
+    parameters: &[Row],
+    level: Level,
+    members: usize,
+) -> &'t mut Filled {
+    tile.get_or_insert_with(|| {
+        let mut tile = Filled::new(evaluation, evaluation.stage.compiled(level, members));
+        for (i, parameter) in parameters.iter().enumerate().filter(|(_, parameter)| parameter.is_common()) {
+            tile.row(evaluation.states + i).fill(parameter.at(0));
+        }
+        tile
+    })
+}
+
 impl<'a> Evaluator<'a> {
     pub(crate) fn new(evaluation: &'a Evaluation, parameters: &'a [Row<'a>], level: Level) -> Self {
         Evaluator { evaluation, parameters, level, tiles: [None, None] }
+    }
+
+    /// The values of one member from its numbers of the state, those of some blocks one after the other.
+    pub(crate) fn one(&mut self, member: usize, state: &[&[f64]]) -> &[f64] {
+        let (n, results, read) = (self.evaluation.states, self.evaluation.values(), self.evaluation.stage.split.body.rows);
+        let tile = tile_of(&mut self.tiles[0], self.evaluation, self.parameters, self.level, 1);
+        let lanes = tile.lanes;
+        for (row, number) in state.iter().copied().flatten().take(read.min(n)).enumerate() {
+            tile.rows[row * lanes] = *number;
+        }
+        for (row, parameter) in self.parameters.iter().enumerate().take(read.saturating_sub(n)) {
+            if !parameter.is_common() {
+                tile.rows[(n + row) * lanes] = parameter.0[member];
+            }
+        }
+        tile.run();
+        if lanes > 1 {
+            (0..results).for_each(|i| tile.values[i] = tile.values[i * lanes]);
+        }
+        &tile.values[..results]
     }
 
     /// The values of each of these members, one after the other, from its numbers of the state, which follow each other likewise.
     pub(crate) fn run(&mut self, members: &[usize], states: &[f64]) -> Vec<f64> {
         let is_many = members.len() >= FEW;
         let (n, results, read) = (self.evaluation.states, self.evaluation.values(), self.evaluation.stage.split.body.rows);
-        let made = || {
-            let compiled = self.evaluation.stage.compiled(self.level, if is_many { MANY } else { 1 });
-            let mut tile = Filled::new(self.evaluation, compiled);
-            for (i, parameter) in self.parameters.iter().enumerate().filter(|(_, parameter)| parameter.is_common()) {
-                tile.row(n + i).fill(parameter.at(0));
-            }
-            tile
-        };
-        let tile = self.tiles[usize::from(is_many)].get_or_insert_with(made);
+        let (evaluation, parameters) = (self.evaluation, self.parameters);
+        let many = if is_many { MANY } else { 1 };
+        let tile = tile_of(&mut self.tiles[usize::from(is_many)], evaluation, parameters, self.level, many);
         let lanes = tile.lanes;
         let mut values = vec![0.0; members.len() * results];
         let own = self.parameters.iter().enumerate().filter(|(i, parameter)| n + i < read && !parameter.is_common());

@@ -15,6 +15,21 @@ pub struct Occurrences {
     pub states: Vec<f64>,
 }
 
+/// A member that is at rest at an event.
+#[derive(Debug)]
+pub struct Rest {
+    /// The member.
+    pub member: i64,
+    /// The number of the event.
+    pub event: i64,
+    /// Whether the event leads the member back to where it is.
+    pub led_back: bool,
+    /// Since when the state was changed as often as it may be; NaN for others.
+    pub often_since: f64,
+    /// Which events set each other off without end.
+    pub circle: Vec<bool>,
+}
+
 /// The events of all members.
 #[derive(Debug, Default)]
 pub struct Found {
@@ -26,6 +41,8 @@ pub struct Found {
     pub stopped_at: Vec<f64>,
     /// Whether a saved time changed the steps of a member with adaptive ones.
     pub other_steps: Vec<bool>,
+    /// The members at rest.
+    pub rests: Vec<Rest>,
 }
 
 impl Found {
@@ -36,6 +53,7 @@ impl Found {
             counts: vec![0; events * members],
             stopped_at: vec![f64::NAN; members],
             other_steps: vec![false; members],
+            rests: Vec::new(),
         }
     }
 
@@ -54,5 +72,6 @@ impl Found {
         }
         self.stopped_at[first..first + of_part].copy_from_slice(&part.stopped_at);
         self.other_steps[first..first + of_part].copy_from_slice(&part.other_steps);
+        self.rests.extend(part.rests);
     }
 }

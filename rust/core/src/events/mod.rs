@@ -4,5 +4,6 @@
 pub mod evaluation;
 pub mod found;
 pub mod motion;
+pub(crate) mod resets;
 pub(crate) mod search;
 pub(crate) mod watch;

@@ -31,6 +31,8 @@ pub struct Event<'a> {
     pub quantity: Values<'a>,
     /// The rate of change of that, of a time, a state and the rates of change of these; none if it has no derivative.
     pub slope: Option<Values<'a>>,
+    /// The new state that it gives a member, of a time and a state; none if it changes nothing.
+    pub then: Option<Values<'a>>,
     /// The sign of the changes that count; 0 for both.
     pub direction: f64,
     /// At which change it stops a member; 0 for none.
@@ -81,12 +83,21 @@ impl States {
     }
 }
 
+/// A state of one member at a time.
+#[derive(Clone, Copy)]
+pub(crate) struct At<'s> {
+    pub member: usize,
+    pub t: f64,
+    pub state: &'s [f64],
+}
+
 /// Answers questions about the motion of any members.
 pub(crate) struct Motion<'a> {
     pub events: &'a Events<'a>,
     step: Evaluator<'a>,
     rates: Evaluator<'a>,
     quantities: Vec<(Evaluator<'a>, Option<Evaluator<'a>>)>,
+    new_states: Vec<Option<Evaluator<'a>>>,
 }
 
 impl<'a> Motion<'a> {
@@ -99,6 +110,7 @@ impl<'a> Motion<'a> {
             step: events.step.evaluator(level),
             rates: events.rates.evaluator(level),
             quantities: events.events.iter().map(of).collect(),
+            new_states: events.events.iter().map(|event| Some(event.then.as_ref()?.evaluator(level))).collect(),
         }
     }
 
@@ -119,6 +131,39 @@ impl<'a> Motion<'a> {
         let numbers = self.step.run(&from.members, &inputs);
         let t = from.t.iter().zip(lengths).map(|(t, h)| t + h).collect();
         States { members: from.members.clone(), t, numbers }
+    }
+
+    /// The state after a step of this length.
+    pub(crate) fn step(&mut self, At { member, t, state }: At, h: f64) -> &[f64] {
+        self.step.one(member, &[&[t, h], state])
+    }
+
+    /// By how much the state would change in such a step at its rates.
+    pub(crate) fn change(&mut self, At { member, t, state }: At, h: f64) -> &[f64] {
+        self.rates.one(member, &[&[t, h], state])
+    }
+
+    /// The quantity of an event.
+    pub(crate) fn g(&mut self, e: usize, At { member, t, state }: At) -> f64 {
+        self.quantities[e].0.one(member, &[&[self.events.sign * t], state])[0]
+    }
+
+    /// The state that an event gives a member in place of this one.
+    pub(crate) fn changed(&mut self, e: usize, At { member, t, state }: At) -> Vec<f64> {
+        let Some(then) = &mut self.new_states[e] else { return state.to_vec() };
+        then.one(member, &[&[self.events.sign * t], state]).to_vec()
+    }
+
+    /// By how much a quantity would change in a step of such a length at the present rates.
+    pub(crate) fn slope(&mut self, e: usize, at: At, h: f64) -> f64 {
+        let (sign, At { member, t, state }) = (self.events.sign, at);
+        let rates = self.rates.one(member, &[&[t, h], state]);
+        if let Some(slope) = &mut self.quantities[e].1 {
+            return finite(slope.one(member, &[&[sign * t], state, &[sign * h], rates])[0]);
+        }
+        let rates = rates.to_vec();
+        let states = States { members: vec![member], t: vec![t], numbers: state.to_vec() };
+        self.differences(e, &states, &[h], &rates)[0]
     }
 
     /// The quantity of an event.

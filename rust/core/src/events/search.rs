@@ -136,6 +136,9 @@ pub(super) fn parted(mut parts: Vec<Part>, look: Look) -> (Vec<Part>, Vec<usize>
         let numbers = states.len() / cuts.len();
         for (i, ((part, _), (_, middle))) in split.into_iter().zip(&cuts).enumerate() {
             let (g, slope, state) = (g[i], slopes[i], states[i * numbers..(i + 1) * numbers].to_vec());
+            if part.g_low == 0.0 && g == 0.0 && part.g_high == 0.0 {
+                continue; // it stays at zero
+            }
             parts.push(Part { high: *middle, g_high: g, slope_high: slope, state, ..part });
             // It has not left zero yet, and is on the same side.
             let lies = part.g_low == 0.0 && g == 0.0 && slope == 0.0;
@@ -191,6 +194,19 @@ impl Bracket {
     }
 }
 
+impl Bracket {
+    /// Takes the quantity at a share. Returns whether the change is there or before.
+    fn take(&mut self, share: f64, g: f64) -> bool {
+        let g = self.sign * g;
+        if g >= 0.0 {
+            (self.high, self.g_high) = (share, g);
+            return true;
+        }
+        (self.low, self.g_low) = (share, g);
+        false
+    }
+}
+
 /// Of a number above zero: by the power of two above it.
 fn exponent(x: f64) -> i32 {
     const SCALE: f64 = (1u64 << 54) as f64;
@@ -202,6 +218,19 @@ fn exponent(x: f64) -> i32 {
 fn times_power(x: f64, power: i32) -> f64 {
     let of = |power: i32| f64::from_bits((1023 + power as u64) << 52);
     x * of(power / 2) * of(power - power / 2)
+}
+
+/// As `located` for one part; `trial` puts the state at a share of the step into the part, if that is at or after the change, as
+/// the sign of its quantity there says.
+pub(super) fn located_alone(part: &mut Part, mut trial: impl FnMut(f64) -> (f64, Vec<f64>)) -> f64 {
+    let mut bracket = Bracket::new(part);
+    while let Some(share) = bracket.next() {
+        let (g, state) = trial(share);
+        if bracket.take(share, g) {
+            part.state = state;
+        }
+    }
+    bracket.high
 }
 
 /// Locates the change of sign in each part: its share of the step, and the state there, which is at or after the change. `trial`
@@ -216,13 +245,8 @@ pub(super) fn located(parts: &mut [Part], trial: Trial) -> Vec<f64> {
         let (g, states) = trial(&asked);
         let numbers = states.len() / asked.len();
         for (((i, share), g), state) in asked.iter().zip(g).zip(states.chunks_exact(numbers)) {
-            let bracket = &mut brackets[*i];
-            let g = bracket.sign * g;
-            if g >= 0.0 {
-                (bracket.high, bracket.g_high) = (*share, g);
+            if brackets[*i].take(*share, g) {
                 parts[*i].state.copy_from_slice(state);
-            } else {
-                (bracket.low, bracket.g_low) = (*share, g);
             }
         }
     }

@@ -4,8 +4,8 @@ use std::sync::{Arc, PoisonError};
 
 use super::{
     found::Found,
-    motion::{Events, Motion, States},
-    search::{LEAST_SHARE, Looks, Part, located, parted, sign},
+    motion::{At, Events, Motion, States},
+    search::{LEAST_SHARE, Looks, Part, located, located_alone, parted, sign},
 };
 use crate::step::watch::REACH;
 
@@ -67,18 +67,18 @@ fn kept(numbers: &[f64], on: &[bool], each: usize) -> Vec<f64> {
 
 /// A part of a step in which a quantity changes its sign once.
 #[derive(Clone)]
-struct Change {
-    step: Arc<Step>,
-    part: Part,
+pub(super) struct Change {
+    pub(super) step: Arc<Step>,
+    pub(super) part: Part,
 }
 
 /// A located change.
 #[derive(Clone)]
-struct Located {
-    step: Arc<Step>,
-    share: f64,
-    t: f64,
-    state: Vec<f64>,
+pub(super) struct Located {
+    pub(super) step: Arc<Step>,
+    pub(super) share: f64,
+    pub(super) t: f64,
+    pub(super) state: Vec<f64>,
 }
 
 /// Where a member stops: in this step.
@@ -91,14 +91,22 @@ pub(crate) struct Stop {
 /// The events of some members, by one thread.
 pub(crate) struct Watch<'a> {
     pub motion: Motion<'a>,
-    first: usize,
-    found: Found,
+    pub(super) first: usize,
+    pub(super) found: Found,
     /// Steps in which something may occur.
     noticed: Vec<Noticed>,
     /// In which the event may occur, and in which it does: they are located later, with others.
     candidates: Vec<Vec<Candidate>>,
     changes: Vec<Vec<Change>>,
 }
+
+/// The side of a quantity from which a member came to the event that then changed its state, where a step begins there; 0 if not.
+pub(super) type Side = f64;
+/// The slope, towards the side from which it came, that a quantity gets if it begins at zero with slope zero.
+const LEAST_SLOPE: f64 = f64::MIN_POSITIVE;
+/// A slope towards the other side counts as zero if it is less than this share of the slope at the end of the step: a bounce
+/// without speed leaves such a slope.
+const NO_SLOPE: f64 = 1.0 / (1u64 << 24) as f64;
 
 impl<'a> Watch<'a> {
     pub(crate) fn new(events: &'a Events<'a>) -> Self {
@@ -139,7 +147,7 @@ impl<'a> Watch<'a> {
         self.motion.events.events.iter().any(|event| event.terminal > 0)
     }
 
-    fn count(&mut self, e: usize, member: usize) -> &mut i64 {
+    pub(super) fn count(&mut self, e: usize, member: usize) -> &mut i64 {
         let members = self.found.stopped_at.len();
         &mut self.found.counts[e * members + member - self.first]
     }
@@ -228,38 +236,7 @@ impl<'a> Watch<'a> {
 
     /// The parts of steps in which an event occurs.
     fn within(&mut self, e: usize, candidates: Vec<Candidate>) -> Vec<Change> {
-        if candidates.is_empty() {
-            return Vec::new();
-        }
-        let (mut starts, mut ends) = (States::default(), States::default());
-        for Candidate { step, .. } in &candidates {
-            starts.push(step.member, step.t, &step.start);
-            ends.push(step.member, step.t + step.h, &step.end);
-        }
-        let lengths: Vec<f64> = candidates.iter().map(|each| each.step.h).collect();
-        let slopes = [&starts, &ends].map(|states| self.motion.slopes(e, states, &lengths));
-        let whole = |(of, each): (usize, &Candidate)| Part {
-            of,
-            low: 0.0,
-            high: 1.0,
-            g_low: each.g[0],
-            g_high: each.g[1],
-            slope_low: slopes[0][of],
-            slope_high: slopes[1][of],
-            state: each.step.end.clone(),
-        };
-        let parts = candidates.iter().enumerate().map(whole).collect();
-        let motion = &mut self.motion;
-        let (parts, _) = parted(parts, &mut |asked| {
-            let (there, g) = trial(motion, e, asked, &|of| &candidates[of].step);
-            let lengths: Vec<f64> = asked.iter().map(|(of, _)| candidates[*of].step.h).collect();
-            let slopes = motion.slopes(e, &there, &lengths);
-            Looks { g, slopes, states: there.numbers }
-        });
-        let direction = self.motion.events.events[e].direction;
-        let counts = |part: &Part| direction == 0.0 || part.g_low * direction < 0.0;
-        let change = |part: Part| Change { step: Arc::clone(&candidates[part.of].step), part };
-        let changes: Vec<Change> = parts.into_iter().filter(counts).map(change).collect();
+        let (changes, _) = self.within_from(e, candidates, |_| 0.0);
         if changes.iter().all(|change| change.step.window.is_none()) {
             return changes;
         }
@@ -268,14 +245,68 @@ impl<'a> Watch<'a> {
         changes.into_iter().zip(located).filter(|(_, one)| counts(one)).map(|(change, _)| change).collect()
     }
 
+    /// The same for members that came from these sides to the event at the start; and which of them return to it within roundings.
+    pub(super) fn within_from(
+        &mut self,
+        e: usize,
+        candidates: Vec<Candidate>,
+        side: impl Fn(usize) -> Side,
+    ) -> (Vec<Change>, Vec<usize>) {
+        if candidates.is_empty() {
+            return Default::default();
+        }
+        let slopes = if let [Candidate { step, .. }] = &candidates[..] {
+            let start = At { member: step.member, t: step.t, state: &step.start };
+            let end = At { t: step.t + step.h, state: &step.end, ..start };
+            [start, end].map(|at| vec![self.motion.slope(e, at, step.h)])
+        } else {
+            let (mut starts, mut ends) = (States::default(), States::default());
+            for Candidate { step, .. } in &candidates {
+                starts.push(step.member, step.t, &step.start);
+                ends.push(step.member, step.t + step.h, &step.end);
+            }
+            let lengths: Vec<f64> = candidates.iter().map(|each| each.step.h).collect();
+            [&starts, &ends].map(|states| self.motion.slopes(e, states, &lengths))
+        };
+        let whole = |(of, each): (usize, &Candidate)| {
+            let ([g, g_high], [slope, slope_high], side) = (each.g, [slopes[0][of], slopes[1][of]], side(of));
+            let is_there = side != 0.0;
+            let lies = slope == 0.0 || (slope * side < 0.0 && slope.abs() <= NO_SLOPE * slope_high.abs());
+            let slope_low = if is_there && lies { side * LEAST_SLOPE } else { slope };
+            let (g_low, state) = (if is_there { 0.0 } else { g }, each.step.end.clone());
+            Part { of, low: 0.0, high: 1.0, g_low, g_high, slope_low, slope_high, state }
+        };
+        let parts = candidates.iter().enumerate().map(whole).collect();
+        let motion = &mut self.motion;
+        let (parts, stuck) = parted(parts, &mut |asked| {
+            let (there, g) = trial(motion, e, asked, &|of| &candidates[of].step);
+            let lengths: Vec<f64> = asked.iter().map(|(of, _)| candidates[*of].step.h).collect();
+            let slopes = motion.slopes(e, &there, &lengths);
+            Looks { g, slopes, states: there.numbers }
+        });
+        let direction = self.motion.events.events[e].direction;
+        let counts = |part: &Part| direction == 0.0 || part.g_low * direction < 0.0;
+        let change = |part: Part| Change { step: Arc::clone(&candidates[part.of].step), part };
+        (parts.into_iter().filter(counts).map(change).collect(), stuck.into_iter().filter(|of| side(*of) != 0.0).collect())
+    }
+
     /// Locates changes of sign.
-    fn located(&mut self, e: usize, changes: Vec<Change>) -> Vec<Located> {
+    pub(super) fn located(&mut self, e: usize, changes: Vec<Change>) -> Vec<Located> {
         let (steps, mut parts): (Vec<_>, Vec<_>) = changes.into_iter().map(|change| (change.step, change.part)).unzip();
         let motion = &mut self.motion;
-        let shares = located(&mut parts, &mut |asked| {
-            let (there, g) = trial(motion, e, asked, &|i| &steps[i]);
-            (g, there.numbers)
-        });
+        let shares = if let ([step], [part]) = (&steps[..], &mut parts[..]) {
+            let (member, state) = (step.member, &step.start);
+            vec![located_alone(part, |share| {
+                let h = share * step.h;
+                let there = motion.step(At { member, t: step.t, state }, h).to_vec();
+                (motion.g(e, At { member, t: step.t + h, state: &there }), there)
+            })]
+        } else {
+            located(&mut parts, &mut |asked| {
+                let (there, g) = trial(motion, e, asked, &|i| &steps[i]);
+                (g, there.numbers)
+            })
+        };
         let made = steps.into_iter().zip(parts).zip(shares);
         made.map(|((step, part), share)| {
             let t = step.t + if share > LEAST_SHARE { share } else { 0.0 } * step.h;
@@ -310,16 +341,7 @@ impl<'a> Watch<'a> {
                 .into_iter()
                 .filter(|change| change.step.number <= stops_in(change.step.member))
                 .partition(|change| change.step.number == stops_in(change.step.member));
-            for change in before {
-                let count = self.count(e, change.step.member);
-                *count += 1;
-                if *count <= self.motion.events.events[e].most {
-                    self.changes[e].push(change);
-                }
-            }
-            if self.changes[e].len() >= LOCATED_AT_ONCE {
-                self.locate_waiting(e);
-            }
+            before.into_iter().for_each(|change| self.put_off(e, change));
             in_last.push(now);
         }
         if last.is_empty() { Vec::new() } else { self.stopped(in_last) }
@@ -371,11 +393,23 @@ impl<'a> Watch<'a> {
     }
 
     /// Counts one, and keeps it if it is among the first.
-    fn note(&mut self, e: usize, one: Located) {
+    pub(super) fn note(&mut self, e: usize, one: Located) {
         let count = self.count(e, one.step.member);
         *count += 1;
         if *count <= self.motion.events.events[e].most {
             self.keep(e, one);
+        }
+    }
+
+    /// Counts a change that ends nothing, and locates it later if it is among the first.
+    pub(super) fn put_off(&mut self, e: usize, change: Change) {
+        let count = self.count(e, change.step.member);
+        *count += 1;
+        if *count <= self.motion.events.events[e].most {
+            self.changes[e].push(change);
+        }
+        if self.changes[e].len() >= LOCATED_AT_ONCE {
+            self.locate_waiting(e);
         }
     }
 

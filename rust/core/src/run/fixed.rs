@@ -432,7 +432,8 @@ impl<T: Real> Job<'_, '_, '_, T> {
             at += block.len() / lanes;
         }
         put(&mut self.part.tally, 0, self.from, self.count, self.group.tally(), lanes);
-        if let Some(looks) = self.looks.take() {
+        if let Some(mut looks) = self.looks.take() {
+            looks.end();
             self.write_stops(&looks);
         }
         true
@@ -471,7 +472,8 @@ impl<T: Real> Job<'_, '_, '_, T> {
                     first: self.part.first + from,
                     count,
                     h: self.plan.clock.h,
-                    first_bad: &self.part.first_bad[from..from + count],
+                    first_bad: &mut self.part.first_bad[from..from + count],
+                    carried: self.plan.carried,
                     group: &mut *self.group,
                 };
                 looks.advance(&mut on, k, n);
@@ -591,7 +593,11 @@ impl<T: Real> Job<'_, '_, '_, T> {
 
     /// Infinities and NaN persist in the slots, so it is enough to check at intervals. Velocities that are computed from a
     /// method's carry may be infinite and later finite again, but only if its numbers are [`Real::HUGE`].
+    /// Where events change states, they are looked at while these happen.
     fn is_suspect(&self) -> bool {
+        if self.looks.as_ref().is_some_and(Looks::changes) {
+            return false;
+        }
         let most = if self.carries { huge(self.plan.clock.h) } else { T::INFINITY };
         self.any_new(most)
     }

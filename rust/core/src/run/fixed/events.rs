@@ -6,6 +6,7 @@ use crate::{
     events::{
         evaluation::Filled,
         motion::Event,
+        resets::{Followed, Memory},
         watch::{Candidates, Noticed, Step, Stop, Watch, may_change},
     },
     group::Group,
@@ -40,6 +41,8 @@ pub(super) struct Looks<'w, 'a, T> {
     together: i64,
     /// Where members stopped.
     stops: Vec<Option<Stop>>,
+    /// What is known of each member, if events change states.
+    memories: Vec<Memory>,
 }
 
 impl<'w, 'a, T> Looks<'w, 'a, T> {
@@ -52,6 +55,9 @@ impl<'w, 'a, T> Looks<'w, 'a, T> {
         let rows = || vec![vec![f64::NAN; lanes]; tiles.len()];
         let (now, before) = (rows(), rows());
         let stops = (0..count).map(|_| None).collect();
+        let events = watch.motion.events.events.len();
+        let remembered = if watch.changes() { count } else { 0 };
+        let memories = (first..first + remembered).map(|member| Memory::new(member, events)).collect();
         Looks {
             watch,
             now,
@@ -63,6 +69,7 @@ impl<'w, 'a, T> Looks<'w, 'a, T> {
             notices,
             together: NOTICED_AT_FIRST,
             stops,
+            memories,
         }
     }
 }
@@ -85,7 +92,9 @@ pub(super) struct Stepped<'s, T: Real> {
     pub(super) count: usize,
     pub(super) h: f64,
     /// The first step of each that is not finite, or −1.
-    pub(super) first_bad: &'s [i64],
+    pub(super) first_bad: &'s mut [i64],
+    /// The run goes on from an earlier one.
+    pub(super) carried: bool,
 }
 
 impl<T: Real> Stepped<'_, T> {
@@ -102,9 +111,22 @@ impl<T: Real> Looks<'_, '_, T> {
         &self.stops
     }
 
+    /// Whether events change states: then steps cannot be made again without them.
+    pub(super) fn changes(&self) -> bool {
+        !self.memories.is_empty()
+    }
+
+    /// Ends the run of these members.
+    pub(super) fn end(&mut self) {
+        self.memories.iter().for_each(|memory| self.watch.end_member(memory));
+    }
+
     /// Makes steps, and looks for events in them.
     pub(super) fn advance(&mut self, on: &mut Stepped<T>, mut k: i64, steps: i64) {
         let until = k + steps;
+        if self.changes() {
+            return self.advance_with_changes(on, k, until);
+        }
         while k < until && self.stops.iter().any(Option::is_none) {
             let noticing = self.notices && self.begun;
             let most = if noticing {
@@ -135,6 +157,97 @@ impl<T: Real> Looks<'_, '_, T> {
         let first = tally.len() - (2 * self.now.len() + 1) * lanes;
         for (rows, (before, now)) in tally[first..].chunks_exact_mut(2 * lanes).zip(self.before.iter().zip(&self.now)) {
             rows.iter_mut().zip(before.iter().chain(now)).for_each(|(to, number)| *to = T::of(*number));
+        }
+    }
+
+    /// Makes steps with events that change states: those of members at which nothing happens in the lanes, all others again.
+    fn advance_with_changes(&mut self, on: &mut Stepped<T>, mut k: i64, until: i64) {
+        let (lanes, events, h) = (on.group.lanes(), self.now.len(), on.h);
+        let goes_on =
+            |looks: &Self| looks.memories.iter().zip(&looks.stops).any(|(memory, stop)| !memory.ended && stop.is_none());
+        while k < until && goes_on(self) {
+            let n = (until - k).min(if self.begun { self.together } else { 1 });
+            self.states.clear();
+            let (v, y) = on.group.slots();
+            self.states.extend_from_slice(v);
+            self.states.extend_from_slice(y);
+            let state_of = |states: &[T], lane: usize| states.iter().skip(lane).step_by(lanes).map(|x| x.wide()).collect();
+            if !self.begun {
+                for (lane, memory) in self.memories.iter_mut().enumerate() {
+                    let state: Vec<f64> = state_of(&self.states, lane);
+                    let t = self.watch.motion.events.begin.at(memory.member) + k as f64 * h;
+                    self.watch.begin_member(memory, t, h, &state, on.carried);
+                }
+                self.remember(on, 0..on.count);
+                self.begun = true;
+            }
+            // Before and after: the quantities that the steps notice with.
+            let (first_row, rows) = (on.group.tally().len().saturating_sub((2 * events + 1) * lanes), 2 * events * lanes);
+            let mut noticed = Vec::new();
+            if self.notices {
+                let tally = on.group.tally_mut();
+                tally[first_row + rows..].fill(T::default());
+                noticed.extend_from_slice(&tally[first_row..first_row + rows]);
+                on.group.advance(k, n);
+            }
+            let (v, y) = on.group.slots();
+            let is_finite =
+                |lane: usize| [v, y].iter().all(|slot| slot.iter().skip(lane).step_by(lanes).all(|x| x.is_below(T::INFINITY)));
+            let may =
+                |lane: usize| !self.notices || on.group.tally()[first_row + rows + lane] != T::default() || !is_finite(lane);
+            let is_followed = |lane: &usize| {
+                let is_bad = self.notices && on.first_bad[*lane] >= 0;
+                self.stops[*lane].is_none() && !is_bad && (self.memories[*lane].is_special() || may(*lane))
+            };
+            let places: Vec<usize> = (0..on.count).filter(is_followed).collect();
+            let share = places.len() * n as usize;
+            if share > on.count * MOST_AGAIN {
+                self.together = (self.together / 2).max(NOTICED_AT_ONCE[0]);
+            } else if share < on.count * MOST_AGAIN / 4 {
+                self.together = (self.together * 2).min(NOTICED_AT_ONCE[1]);
+            }
+            let mut left = places.iter().peekable();
+            let mut followed = Vec::with_capacity(places.len());
+            for (lane, memory) in self.memories.iter_mut().enumerate() {
+                if left.next_if_eq(&&lane).is_none() {
+                    continue;
+                }
+                if self.notices {
+                    let number = |row: usize| noticed[row * lanes + lane].wide();
+                    memory.before.iter_mut().enumerate().for_each(|(e, before)| *before = number(2 * e));
+                    memory.now.iter_mut().enumerate().for_each(|(e, now)| *now = number(2 * e + 1));
+                }
+                let first_bad = Some(on.first_bad[lane]).filter(|step| *step >= 0);
+                followed.push(Followed { memory, state: state_of(&self.states, lane), first_bad, stop: None });
+            }
+            self.watch.follow(&mut followed, k, k + n, h);
+            let results: Vec<_> = followed.into_iter().map(|each| (each.state, each.first_bad, each.stop)).collect();
+            for (lane, (state, first_bad, stop)) in places.iter().zip(results) {
+                let (v, y) = on.group.slots_mut();
+                let slots = v.iter_mut().skip(*lane).step_by(lanes).chain(y.iter_mut().skip(*lane).step_by(lanes));
+                slots.zip(state).for_each(|(to, x)| *to = T::of(x));
+                on.first_bad[*lane] = first_bad.unwrap_or(-1);
+                self.stops[*lane] = stop;
+            }
+            self.remember(on, places.into_iter());
+            k += n;
+        }
+    }
+
+    /// What is noticed of these lanes goes on with the quantities that are remembered.
+    fn remember(&self, on: &mut Stepped<T>, places: impl Iterator<Item = usize>) {
+        if !self.notices {
+            return;
+        }
+        let lanes = on.group.lanes();
+        let tally = on.group.tally_mut();
+        let first = tally.len() - (2 * self.now.len() + 1) * lanes;
+        for lane in places {
+            let memory = &self.memories[lane];
+            for (e, (before, now)) in memory.before.iter().zip(&memory.now).enumerate() {
+                tally[first + 2 * e * lanes + lane] = T::of(*before);
+                tally[first + (2 * e + 1) * lanes + lane] = T::of(*now);
+            }
         }
     }
 
