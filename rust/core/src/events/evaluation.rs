@@ -135,7 +135,7 @@ pub(crate) struct Evaluator<'a> {
 }
 
 /// Fewer members are computed one by one.
-const FEW: usize = 3;
+pub(super) const FEW: usize = 3;
 /// So many together are worth the most lanes.
 const MANY: usize = 64;
 

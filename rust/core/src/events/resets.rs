@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use super::{
+    evaluation::FEW,
     found::Rest,
     motion::{At, Events, States},
     search::{LEAST_SHARE, Part, located_alone, sign},
@@ -140,6 +141,13 @@ pub(crate) struct Followed<'m> {
     pub first_bad: Option<i64>,
     /// Where it stopped.
     pub stop: Option<Stop>,
+}
+
+/// What members come to in a step: their states, and each member's quantities.
+#[derive(Default)]
+struct Made {
+    ends: Vec<f64>,
+    next: Vec<f64>,
 }
 
 impl Watch<'_> {
@@ -443,28 +451,17 @@ impl Watch<'_> {
     /// Makes steps of members, from one number to another, with all that events do to them.
     pub(crate) fn follow(&mut self, followed: &mut [Followed], from: i64, until: i64, h: f64) {
         let (n, events) = (self.motion.events.numbers, self.events());
+        let (mut moving, mut made) = (Vec::new(), Made::default());
         for number in from..until {
-            let mut moving: Vec<usize> = Vec::with_capacity(followed.len());
+            moving.clear();
             for (i, each) in followed.iter_mut().enumerate() {
                 if !each.memory.ended && each.stop.is_none() && self.wakes(each, number, h) {
                     moving.push(i);
                 }
             }
-            if moving.is_empty() {
-                continue;
-            }
-            let mut starts = States::default();
-            for i in &moving {
-                let Followed { memory, state, .. } = &followed[*i];
-                starts.push(memory.member, self.time(memory.member, number, h), state);
-            }
-            let mut ends = self.motion.steps(&starts, &vec![h; moving.len()]);
+            self.make(&moving, followed, (number, h), &mut made);
             for (place, i) in moving.iter().enumerate() {
-                ends.t[place] = self.time(followed[*i].memory.member, number + 1, h);
-            }
-            let next: Vec<Vec<f64>> = (0..events).map(|e| self.motion.quantity(e, &ends)).collect();
-            for (place, i) in moving.iter().enumerate() {
-                let end = &ends.numbers[place * n..(place + 1) * n];
+                let (end, next) = (&made.ends[place * n..(place + 1) * n], &made.next[place * events..(place + 1) * events]);
                 let each = &mut followed[*i];
                 let is_finite = each.state.iter().chain(end).all(|x| x.is_finite());
                 if !is_finite || each.first_bad.is_some() {
@@ -473,17 +470,50 @@ impl Watch<'_> {
                     continue;
                 }
                 let memory = &mut *each.memory;
-                let may = |e: usize| may_change(memory.before[e], memory.now[e], next[e][place]);
+                let may = |e: usize| may_change(memory.before[e], memory.now[e], next[e]);
                 if memory.is_fresh() || (0..events).any(may) {
-                    let (t, start) = (starts.t[place], std::mem::replace(&mut each.state, end.to_vec()));
-                    let whole = Step { member: memory.member, number, t, h, start, end: end.to_vec(), window: None };
-                    self.look(each, whole, next.iter().map(|of| of[place]).collect());
+                    let start = std::mem::replace(&mut each.state, end.to_vec());
+                    let (member, t) = (memory.member, self.time(memory.member, number, h));
+                    let whole = Step { member, number, t, h, start, end: end.to_vec(), window: None };
+                    self.look(each, whole, next);
                     continue;
                 }
                 each.state.copy_from_slice(end);
-                next.iter().enumerate().for_each(|(e, of)| memory.goes_on(e, of[place]));
+                next.iter().enumerate().for_each(|(e, g)| memory.goes_on(e, *g));
             }
         }
+    }
+
+    /// Makes a step of some members.
+    fn make(&mut self, moving: &[usize], followed: &[Followed], (number, h): (i64, f64), made: &mut Made) {
+        let (n, events) = (self.motion.events.numbers, self.events());
+        made.ends.clear();
+        made.next.clear();
+        if moving.len() < FEW {
+            for i in moving {
+                let Followed { memory, state, .. } = &followed[*i];
+                let start = At { member: memory.member, t: self.time(memory.member, number, h), state };
+                made.ends.extend_from_slice(self.motion.step(start, h));
+                let (t, state) = (self.time(memory.member, number + 1, h), &made.ends[made.ends.len() - n..]);
+                made.next.extend((0..events).map(|e| self.motion.g(e, At { t, state, ..start })));
+            }
+            return;
+        }
+        let mut starts = States::default();
+        for i in moving {
+            let Followed { memory, state, .. } = &followed[*i];
+            starts.push(memory.member, self.time(memory.member, number, h), state);
+        }
+        let mut ends = self.motion.steps(&starts, &vec![h; moving.len()]);
+        for (t, member) in ends.t.iter_mut().zip(&starts.members) {
+            *t = self.time(*member, number + 1, h);
+        }
+        made.next.resize(moving.len() * events, 0.0);
+        for e in 0..events {
+            let all = self.motion.quantity(e, &ends);
+            made.next.iter_mut().skip(e).step_by(events).zip(all).for_each(|(to, g)| *to = g);
+        }
+        made.ends = ends.numbers;
     }
 
     /// Whether a member goes on in a step; one at rest does where the event no longer holds it at the end.
@@ -510,7 +540,7 @@ impl Watch<'_> {
     }
 
     /// Looks for events in a step of a member, whose quantities at the end are `next`.
-    fn look(&mut self, each: &mut Followed, whole: Step, next: Vec<f64>) {
+    fn look(&mut self, each: &mut Followed, whole: Step, next: &[f64]) {
         let (step, memory) = (Arc::new(whole), &mut *each.memory);
         let member = memory.member;
         let start = At { member, t: step.t, state: &step.start };
@@ -532,7 +562,7 @@ impl Watch<'_> {
             for (e, of_event) in changes {
                 of_event.into_iter().for_each(|change| self.put_off(e, change));
             }
-            next.into_iter().enumerate().for_each(|(e, g)| memory.goes_on(e, g));
+            next.iter().enumerate().for_each(|(e, g)| memory.goes_on(e, *g));
             return;
         }
         let end = self.time(member, step.number + 1, step.h);

@@ -17,11 +17,14 @@ use crate::{
 /// So many steps are made at a time: their states stay in a cache.
 const STEPS_AT_ONCE: i64 = 64;
 
-/// Where the steps notice what may occur, so many are made at a time, at first and at least and at most. If more than this many
-/// steps of each member would be repeated, half as many; if less than a fourth of it, twice as many.
+/// Where the steps notice what may occur, so many are made at a time, at first and at least and at most; and no more than so many
+/// of all members of a group, which are much more than it takes to look at them.
 const NOTICED_AT_FIRST: i64 = 16;
-const NOTICED_AT_ONCE: [i64; 2] = [8, 256];
-const MOST_AGAIN: usize = 2;
+const NOTICED_AT_ONCE: [i64; 2] = [4, 64];
+const NOTICED_OF_GROUP: i64 = 1 << 11;
+/// If more than one step for so many members would be repeated, half as many are made at a time; if less than a fourth of it, twice
+/// as many.
+const FEWER_AGAIN: usize = 2;
 
 /// The quantities of a group while it is stepped.
 pub(super) struct Looks<'w, 'a, T> {
@@ -200,12 +203,7 @@ impl<T: Real> Looks<'_, '_, T> {
                 self.stops[*lane].is_none() && !is_bad && (self.memories[*lane].is_special() || may(*lane))
             };
             let places: Vec<usize> = (0..on.count).filter(is_followed).collect();
-            let share = places.len() * n as usize;
-            if share > on.count * MOST_AGAIN {
-                self.together = (self.together / 2).max(NOTICED_AT_ONCE[0]);
-            } else if share < on.count * MOST_AGAIN / 4 {
-                self.together = (self.together * 2).min(NOTICED_AT_ONCE[1]);
-            }
+            self.choose_together(places.len() * n as usize, on);
             let mut left = places.iter().peekable();
             let mut followed = Vec::with_capacity(places.len());
             for (lane, memory) in self.memories.iter_mut().enumerate() {
@@ -231,6 +229,16 @@ impl<T: Real> Looks<'_, '_, T> {
             }
             self.remember(on, places.into_iter());
             k += n;
+        }
+    }
+
+    /// Chooses how many steps are made together, after so many of members have to be repeated.
+    fn choose_together(&mut self, again: usize, on: &Stepped<T>) {
+        let [least, most] = NOTICED_AT_ONCE;
+        if again * FEWER_AGAIN > on.count {
+            self.together = (self.together / 2).max(least);
+        } else if 4 * again * FEWER_AGAIN < on.count {
+            self.together = (self.together * 2).min((NOTICED_OF_GROUP / on.group.lanes() as i64).clamp(least, most));
         }
     }
 
@@ -265,10 +273,12 @@ impl<T: Real> Looks<'_, '_, T> {
         self.states.extend_from_slice(y);
         on.group.advance(k, n);
         let may = &on.group.tally()[first_row + rows..][..on.count];
-        if may.iter().all(|may| *may == T::default()) {
-            self.together = (self.together * 2).min(NOTICED_AT_ONCE[1]);
+        let flagged = may.iter().filter(|may| **may != T::default()).count();
+        self.choose_together(flagged * n as usize, on);
+        if flagged == 0 {
             return;
         }
+        let may = &on.group.tally()[first_row + rows..][..on.count];
         let (first, h, events) = (on.first, on.h, self.watch.motion.events);
         let mut noticed = Vec::new();
         for lane in (0..on.count).filter(|lane| may[*lane] != T::default()) {
@@ -288,13 +298,6 @@ impl<T: Real> Looks<'_, '_, T> {
                 start: numbers(2 * events_of_step, 1).collect(),
                 until: k + n,
             });
-        }
-        // Where few have one, more steps are made together, which then takes less time than to repeat those of these few.
-        let share = noticed.len() * n as usize;
-        if share > on.count * MOST_AGAIN {
-            self.together = (self.together / 2).max(NOTICED_AT_ONCE[0]);
-        } else if share < on.count * MOST_AGAIN / 4 {
-            self.together = (self.together * 2).min(NOTICED_AT_ONCE[1]);
         }
         for stop in self.watch.notice(noticed) {
             let lane = stop.step.member - first;

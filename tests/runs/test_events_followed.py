@@ -1,0 +1,135 @@
+"""Events that change the state are followed by the core, member by member, as the reference follows all members together."""
+
+import warnings
+from typing import Any
+
+import numpy as np
+import pytest
+import stepwell as sw
+from stepwell.reference import events as reference_events
+from stepwell.runs.events import driver
+from support.ways import assert_same_run
+
+#: Events of two coordinates: resets, a floor of an empty tank, an exchange, a kick, one that only is noted, one that stops.
+OF_COORDINATES = {
+    "spike": lambda: sw.Event(lambda t, y: y[0] - 0.5, direction=1, then=lambda t, y: [y[0] - 1.0, y[1]], name="spike"),
+    "zero": lambda: sw.Event(lambda t, y: y[0], direction=-1, then=lambda t, y: [0.0 * y[0], y[1]], name="zero"),
+    "tank": lambda: sw.Event(lambda t, y: y[0], direction=-1, then=lambda t, y: [np.maximum(y[0], 0.0), y[1]], name="tank"),
+    "swap": lambda: sw.Event(lambda t, y: y[1] - y[0], then=lambda t, y: [y[1], y[0]], name="swap"),
+    "flip": lambda: sw.Event(lambda t, y: y[1] + 0.3, then=lambda t, y: [y[0], -y[1]], name="flip"),
+    "noted": lambda: sw.Event(lambda t, y: y[1] * y[0] - 0.2, name="noted"),
+    "end": lambda: sw.Event(lambda t, y: y[1] - 0.8, terminal=2, name="end"),
+    "often": lambda: sw.Event(
+        lambda t, y: np.sin(2.0 * t) - 0.3 + 0.1 * y[0], direction=1, then=lambda t, y: [y[0] + 0.5, y[1] - 0.4], name="often"
+    ),
+    "kick": lambda: sw.Event(lambda t, y: y[0] - 0.5, direction=1, then=lambda t, y: [y[0], y[1] + 1.0], name="kick"),
+    "box": lambda: sw.Event(lambda t, y: abs(y[0]) - 1.5, then=lambda t, y: [0.1 * y[0], y[1]], name="box"),
+}
+#: Events of a place and its velocity: bounces, stops at a wall, a kick where it turns.
+OF_A_PLACE = {
+    "bounce": lambda: sw.Event(lambda t, v, y: y, direction=-1, then=lambda t, v, y: (-0.8 * v, y), name="bounce"),
+    "soft": lambda: sw.Event(lambda t, v, y: y, direction=-1, then=lambda t, v, y: (-0.3 * v, 0.0 * y), name="soft"),
+    "stick": lambda: sw.Event(lambda t, v, y: y + 0.2, direction=-1, then=lambda t, v, y: (0.0 * v, y), name="stick"),
+    "top": lambda: sw.Event(lambda t, v, y: y - 0.6, direction=1, then=lambda t, v, y: (-v, y), name="top"),
+    "turn": lambda: sw.Event(lambda t, v, y: v, then=lambda t, v, y: (v + 0.2, y), name="turn"),
+    "noted": lambda: sw.Event(lambda t, v, y: v - 0.1, name="noted"),
+    "end": lambda: sw.Event(lambda t, v, y: y - 0.3, terminal=5, name="end"),
+}
+#: In this run states are changed again and again in no time, for which the reference takes two minutes.
+CHATTERING = (38,)
+METHODS = ("rk4", "standard_heun", "false_euler", "standard_euler", "dop853", "rosenbrock23", "merson")
+
+
+@sw.system(order=1, shape=(2,))
+def linear(t: Any, y: Any, *, a: Any = np.zeros((2, 2)), b: Any = np.zeros(2), w: float = 1.0) -> Any:
+    return [a[0, 0] * y[0] + a[0, 1] * y[1] + b[0] + 0.3 * np.sin(w * t), a[1, 0] * y[0] + a[1, 1] * y[1] + b[1]]
+
+
+@sw.system(order=2)
+def driven(t: Any, v: Any, y: Any, *, k: float = 1.0, f: float = 0.5, w: float = 1.0) -> Any:
+    return -k * y - 0.1 * v + f * np.sin(w * t)
+
+
+def drawn(number: int, backend: str) -> sw.Run:
+    """A run with one to three of these events, from starts with one decimal place, some of them at an event."""
+    random = np.random.default_rng([13, number])
+    pool = (OF_COORDINATES, OF_A_PLACE)[number % 2]
+    events = [pool[name]() for name in random.choice(list(pool), size=random.integers(1, 4), replace=False)]
+    n, dt, every = int(random.choice([1, 3, 9])), float(random.choice([0.01, 0.1, 0.3])), random.choice([None, 1, 5])
+    options: Any = {"dt": dt, "steps": int(random.choice([7, 30])), "every": None if every is None else int(every)}
+    w = float(random.choice([0.5, 3.0]))
+    if number % 2:
+        options |= {"v": np.round(random.normal(size=n), 1), "y": np.round(random.normal(size=n), 1) * (random.random() > 0.2)}
+        system = driven(k=float(random.choice([0.0, 1.0, 4.0])), f=random.choice([0.0, 0.5, 2.0], size=n), w=w)
+    else:
+        options |= {"y": np.round(random.normal(size=(2, n)), 1)}
+        system = linear(a=np.round(random.normal(size=(2, 2)), 1), b=np.round(random.normal(size=2), 1), w=w)
+    return sw.integrate(system, str(random.choice(METHODS)), events=events, backend=backend, **options)
+
+
+def check_the_core_follows_as_the_reference_does(numbers: range) -> None:
+    occurred, rested = 0, 0
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        for number in (each for each in numbers if each not in CHATTERING):
+            run, reference = (drawn(number, backend) for backend in ("rust", "numpy"))
+            assert_same_run(run, reference)
+            assert [str(each) for each in run.findings] == [str(each) for each in reference.findings], number
+            occurred += sum(int(each.count.sum()) for each in run.events.values())
+            rested += int(np.sum(run.status == sw.Status.REST))
+    assert occurred > 3 * len(numbers)
+    assert rested > 0
+
+
+@pytest.mark.parametrize("part", range(4))
+def test_the_core_follows_as_the_reference_does(part: int) -> None:
+    check_the_core_follows_as_the_reference_does(range(16 * part, 16 * part + 16))
+
+
+def test_no_member_waits_for_others(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Steps with events that change the state are the core's, but for methods that carry something else than v."""
+    grouped: list[int] = []
+    group = driver._Resetting._group
+    monkeypatch.setattr(driver._Resetting, "_group", lambda self, *of: grouped.append(1) or group(self, *of))
+    bounce = OF_A_PLACE["bounce"]()
+    options: Any = {"v": 0.0, "y": np.linspace(0.1, 1.0, 5), "dt": 0.02, "steps": 100, "events": bounce}
+    assert sw.integrate(driven(f=0.0), "rk4", **options).events["bounce"].count.sum() >= 5
+    assert not grouped
+    falling = sw.system(order=2)(lambda t, v, y: -1.0 + 0.0 * y)()
+    assert sw.integrate(falling, "verlet", **options).events["bounce"].count.sum() >= 5
+    assert grouped
+
+
+def test_a_quantity_that_stays_at_zero_is_not_divided_for_ever() -> None:
+    """A place that is set at rest stays through a step of Standard Euler, where its rate of change does not stay zero."""
+    looks: list[int] = []
+    looked = reference_events.joined
+
+    def joined(several: Any) -> Any:
+        together = looked(several)
+        looks.append(len(together.of))
+        return together
+
+    stick = OF_A_PLACE["stick"]()
+    options: Any = {"v": [0.4], "y": [0.0], "dt": 0.3, "steps": 7, "events": stick}
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(reference_events, "joined", joined)
+        reference = sw.integrate(driven(k=4.0, f=0.0), "standard_euler", backend="numpy", **options)
+    assert 0 < max(looks) < 100
+    assert reference.y[-1, 0] == -0.2  # set at rest within this step, and moved by the next one
+    run = sw.integrate(driven(k=4.0, f=0.0), "standard_euler", **options)
+    assert np.array_equal(run.y, reference.y)
+    assert run.events["stick"].count[0] == reference.events["stick"].count[0] == 1
+
+
+@pytest.mark.parametrize("method", ["merson", "tsit5", "dop853"])
+def test_trials_of_fused_attempts_fuse_what_attempts_do(method: str) -> None:
+    """Bodies whose rates say which products are fused: the core's trial is traced, the reference's is not."""
+    random = np.random.default_rng(3)
+    v, y = random.normal(size=(2, 2, 2, 40))
+    system = sw.NBody(masses=[1.0, 0.5], force="logarithmic", G=1.0, softening=0.3)
+    event = sw.Event(lambda t, v, y: y[0, 0] - 0.2, terminal=True, name="passed")
+    options: Any = {"v": v, "y": y, "tolerance": 1e-3, "at": [2.0], "events": event, "fused": True}
+    run, reference = (sw.integrate(system, method, backend=backend, **options) for backend in ("rust", "numpy"))
+    assert np.sum(run.events["passed"].count) > 10
+    assert_same_run(run, reference)
