@@ -3,7 +3,7 @@
 /// See `reference/events.py` for these.
 pub(super) const SPACING: f64 = 1.0 / (1u64 << 52) as f64;
 const SHARE: f64 = 1.0 / (1u64 << 48) as f64;
-const MOST_TRIALS: i32 = 49;
+const MOST_TRIALS: i32 = 56;
 /// A share of a step that counts as its start: 2⁻¹⁰⁰⁰.
 pub(super) const LEAST_SHARE: f64 = f64::from_bits((1023 - 1000) << 52);
 const TRUNCATION: f64 = 0.02;
