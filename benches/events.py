@@ -160,7 +160,7 @@ def of_numba() -> None:
     for members in (1, 1000):
         at = np.empty(64)
         kinds = {"without": (False, False), "finding": (True, False), "changing": (True, True)}
-        ms = least({name: lambda kind=kind: loop(members, 4000, 0.01, *kind, at) for name, kind in kinds.items()})
+        ms = least({name: lambda kind=kind, n=members, at=at: loop(n, 4000, 0.01, *kind, at) for name, kind in kinds.items()})
         ratios = " | ".join(f"{ms[name] / ms['without']:.1f}" for name in ("finding", "changing"))
         print(f"| numba, `rk4` | {members} | {ms['without']:.2f} | | {ratios} | |")
 
@@ -168,7 +168,8 @@ def of_numba() -> None:
 def main() -> None:
     """Print the tables."""
     warnings.simplefilter("ignore", sw.EventWarning)
-    print("| | trajectories | without, ms | watching, ratio | finding, ratio | changing, ratio | found |\n|---|---|---|---|---|---|---|")
+    print("| | trajectories | without, ms | watching, ratio | finding, ratio | changing, ratio | found |")
+    print("|---|---|---|---|---|---|---|")
     for members in (1, 1000, 100_000):
         of_duffing("rk4", members, dt=0.01, steps=4000 if members < 1e5 else 400)
     for members in (1, 1000):

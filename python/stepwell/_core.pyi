@@ -355,6 +355,11 @@ def ask(function: Callable[[], object] | None) -> None:
 def listen() -> None:
     """Raise if this thread is to stop: what the function says that it asks, and ``KeyboardInterrupt`` after Ctrl-C."""
 
+def locate(
+    events: object, of_all: int, e: int, members: NDArray[np.int64], numbers: NDArray[np.float64], states: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Of events of ``runs.events.by_core``: the shares of steps at which one changes its sign, and the states there."""
+
 def run_and_look(model: ModelSpec, plan: Plan, arrays: Arrays, events: object) -> tuple[bool, object]:
     """``run`` with events, of ``runs.events.by_core``: also what was found of them."""
 

@@ -37,11 +37,13 @@ OF_A_PLACE = {
 }
 #: In this run states are changed again and again in no time, for which the reference takes two minutes.
 CHATTERING = (38,)
+NONE = np.zeros((2, 2))
+ADAPTIVE = ("dop853", "merson", "tsit5", "rodas5p", "taylor")
 METHODS = ("rk4", "standard_heun", "false_euler", "standard_euler", "dop853", "rosenbrock23", "merson")
 
 
 @sw.system(order=1, shape=(2,))
-def linear(t: Any, y: Any, *, a: Any = np.zeros((2, 2)), b: Any = np.zeros(2), w: float = 1.0) -> Any:
+def linear(t: Any, y: Any, *, a: Any = NONE, b: Any = NONE[0], w: float = 1.0) -> Any:
     return [a[0, 0] * y[0] + a[0, 1] * y[1] + b[0] + 0.3 * np.sin(w * t), a[1, 0] * y[0] + a[1, 1] * y[1] + b[1]]
 
 
@@ -50,7 +52,7 @@ def driven(t: Any, v: Any, y: Any, *, k: float = 1.0, f: float = 0.5, w: float =
     return -k * y - 0.1 * v + f * np.sin(w * t)
 
 
-def drawn(number: int, backend: str) -> sw.Run:
+def drawn(number: int, backend: str, adaptive: bool = False) -> sw.Run:
     """A run with one to three of these events, from starts with one decimal place, some of them at an event."""
     random = np.random.default_rng([13, number])
     pool = (OF_COORDINATES, OF_A_PLACE)[number % 2]
@@ -64,26 +66,35 @@ def drawn(number: int, backend: str) -> sw.Run:
     else:
         options |= {"y": np.round(random.normal(size=(2, n)), 1)}
         system = linear(a=np.round(random.normal(size=(2, 2)), 1), b=np.round(random.normal(size=2), 1), w=w)
-    return sw.integrate(system, str(random.choice(METHODS)), events=events, backend=backend, **options)
+    method = str(random.choice(METHODS if not adaptive else ADAPTIVE))
+    if adaptive:
+        options = {name: options[name] for name in ("v", "y") if name in options} | {"tolerance": 1e-5, "at": [0.7, 1.5, 2.0]}
+    return sw.integrate(system, method, events=events, backend=backend, **options)
 
 
-def check_the_core_follows_as_the_reference_does(numbers: range) -> None:
+def check_the_core_follows_as_the_reference_does(numbers: range, adaptive: bool = False) -> None:
     occurred, rested = 0, 0
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         for number in (each for each in numbers if each not in CHATTERING):
-            run, reference = (drawn(number, backend) for backend in ("rust", "numpy"))
+            run, reference = (drawn(number, backend, adaptive) for backend in ("rust", "numpy"))
             assert_same_run(run, reference)
             assert [str(each) for each in run.findings] == [str(each) for each in reference.findings], number
             occurred += sum(int(each.count.sum()) for each in run.events.values())
             rested += int(np.sum(run.status == sw.Status.REST))
     assert occurred > 3 * len(numbers)
-    assert rested > 0
+    assert rested > 0 or adaptive
 
 
 @pytest.mark.parametrize("part", range(4))
 def test_the_core_follows_as_the_reference_does(part: int) -> None:
     check_the_core_follows_as_the_reference_does(range(16 * part, 16 * part + 16))
+
+
+@pytest.mark.parametrize("part", range(2))
+def test_the_core_locates_as_the_reference_does(part: int) -> None:
+    """With a tolerance the reference's driver asks the core where changes of sign are."""
+    check_the_core_follows_as_the_reference_does(range(8 * part, 8 * part + 8), adaptive=True)
 
 
 def test_no_member_waits_for_others(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -13,9 +13,9 @@ from ..base.arrays import Array, Whole
 
 #: The relative accuracy of a change of sign, of the time since the start of its step: the rounding error of a trial's length.
 SPACING = 2.0**-52
-#: It is looked for in rounds, the first down to this share of the step, in so many trials: bisection needs 48, and may be ahead by
-#: eight. With one alone, a first secant that is no good, as where g has just left zero, leaves bisection for all others. Each later
-#: round begins with the bracket of the last, since an event may be ever so near to the step's start.
+#: It is looked for in rounds, the first down to this share of the step, in so many trials: bisection needs 48, and may be ahead
+#: by eight. With one alone, a first secant that is no good, as where g has just left zero, leaves bisection for all others. Each
+#: later round begins with the bracket of the last, since an event may be ever so near to the step's start.
 SHARE, MOST_TRIALS = 2.0**-48, 56
 #: Brackets shorter than this share of a step are not cut any further.
 LEAST_SHARE = 2.0**-1000
@@ -182,7 +182,8 @@ def located(trial: Trial, low: Array, high: Array, g_low: Array, g_high: Array, 
     """Locate a change of sign of g in each step, and the state there, which is at or after the change.
 
     Each trial is a step of the method from the step's own start, of another length. The lengths are chosen by the ITP method
-    (Oliveira and Takahashi 2020), a secant that never takes more than eight trials more than bisection would, and one or two in later rounds.
+    (Oliveira and Takahashi 2020), a secant that in the first round never takes more than eight trials more than bisection would,
+    and in each later one two.
 
     Args:
         trial: makes steps of these shares of the full steps.

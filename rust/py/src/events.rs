@@ -2,10 +2,11 @@
 
 use std::sync::{Mutex, PoisonError};
 
-use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1};
+use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 use stepwell_core::{
     events::{
+        self, Brackets,
         found::{Found, Rest},
         motion::{self, Events},
     },
@@ -120,4 +121,21 @@ pub(crate) fn found(py: Python<'_>, events: &Events) -> AllFound {
     let (counts, stopped_at) = (counts.into_pyarray(py).unbind(), stopped_at.into_pyarray(py).unbind());
     let of_rest = |rest: Rest| (rest.member, rest.event, rest.led_back, rest.often_since, rest.circle);
     (of_each.collect(), counts, stopped_at, other_steps.into_pyarray(py).unbind(), rests.into_iter().map(of_rest).collect())
+}
+
+/// Locates changes of sign of an event of so many members: see `locate` of the core. Returns the shares, and the states.
+#[pyfunction]
+pub(crate) fn locate(
+    py: Python<'_>,
+    events: EventsOf<'_>,
+    of_all: usize,
+    e: usize,
+    members: PyReadonlyArray1<'_, i64>,
+    numbers: PyReadonlyArray2<'_, f64>,
+    states: PyReadonlyArray2<'_, f64>,
+) -> PyResult<(Real, Real)> {
+    let events = events.of_core(of_all)?;
+    let brackets = Brackets { members: members.as_slice()?, numbers: numbers.as_slice()?, states: states.as_slice()? };
+    let (shares, states) = events::locate(&events, e, &brackets);
+    Ok((shares.into_pyarray(py).unbind(), states.into_pyarray(py).unbind()))
 }

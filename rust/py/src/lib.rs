@@ -569,6 +569,7 @@ fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_function(wrap_pyfunction!(listen, m)?)?;
     m.add_function(wrap_pyfunction!(run, m)?)?;
     m.add_function(wrap_pyfunction!(run_and_look, m)?)?;
+    m.add_function(wrap_pyfunction!(events::locate, m)?)?;
     m.add_function(wrap_pyfunction!(recorded, m)?)?;
     m.add_function(wrap_pyfunction!(adapt, m)?)?;
     m.add_function(wrap_pyfunction!(adapt_and_look, m)?)?;

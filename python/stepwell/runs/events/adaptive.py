@@ -66,8 +66,10 @@ class AdaptiveRun:
         changing = any(event.then for event in self._events)
         self._driver = driver = (_Resetting if changing else _Driver)(plan, self._events, pacing)
         driver.keep = self._keep
+        looked = by_core.sought(driver)
         # A series is not looked at in the lanes, where its coefficients are.
-        if changing or self._keep is not None or plan.method.has_series or (looked := by_core.sought(driver)) is None:
+        if changing or self._keep is not None or plan.method.has_series or looked is None:
+            driver.locator = None if looked is None else partial(by_core.located, driver, looked)
             out = driver.run(paces, v, y)
         else:
             out = engine.adapt(plan, pacing, paces, v, y, make=partial(by_core.adapted, driver, looked))

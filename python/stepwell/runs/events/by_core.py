@@ -12,7 +12,7 @@ from ...base.arrays import Array
 from .. import engine
 from .collected import Collected
 from .evaluated import Evaluated
-from .parts import Located
+from .parts import Changes, Located
 from .timed import Timed
 from .traced import NewState
 
@@ -111,10 +111,28 @@ def take(search: Collected, found: Any) -> None:
     """Take what the core found."""
     of_each, counts, stopped_at, search.other_steps, search.rested = found
     shapes = search.plan.system.v_shape, search.plan.system.y_shape
-    n_v, n = prod(shapes[0]), prod(shapes[0]) + prod(shapes[1])
     search.count[...] = counts.reshape(search.count.shape)
     search.stopped_at[...] = stopped_at
     for entries, (member, step, share, t, states) in zip(search.entries, of_each, strict=True):
-        rows = states.reshape(-1, n).T
-        v, y = (block.reshape(*shape, len(member)) for block, shape in zip((rows[:n_v], rows[n_v:]), shapes, strict=True))
-        entries.append(Located(member, step, share, t, v, y))
+        entries.append(Located(member, step, share, t, *blocks_of(shapes, states, len(member))))
+
+
+def located(search: Collected, sought: Sought, e: int, changes: Changes) -> tuple[Array, Array, Array]:
+    """The shares of steps at which an event changes its sign, and the states there."""
+    shapes = search.plan.system.v_shape, search.plan.system.y_shape
+    rows = [*rows_of(shapes, changes.v, changes.y), *rows_of(shapes, changes.v_end, changes.y_end)]
+    numbers = np.array([changes.t, changes.h, changes.low, changes.high, changes.g, changes.g_end]).T.copy()
+    share, states = _core.locate(sought, search.plan.members, e, changes.member, numbers, np.array(rows).T.copy())
+    v, y = blocks_of(shapes, states, len(share))
+    return share, v, y
+
+
+def rows_of(shapes: tuple[Any, Any], *blocks: Array) -> list[Array]:
+    """The numbers of blocks of some members, each over all of these."""
+    return [block[index] for block, shape in zip(blocks, shapes, strict=True) for index in np.ndindex(shape)]
+
+
+def blocks_of(shapes: tuple[Any, Any], states: Array, count: int) -> tuple[Array, Array]:
+    """Velocities and coordinates of so many members, whose numbers stand one after the other."""
+    n_v, rows = prod(shapes[0]), states.reshape(count, prod(shapes[0]) + prod(shapes[1])).T
+    return rows[:n_v].reshape(*shapes[0], count), rows[n_v:].reshape(*shapes[1], count)

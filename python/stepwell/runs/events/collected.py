@@ -61,6 +61,8 @@ class Collected:
         self.sign = -1.0 if plan.backward else 1.0
         #: The direction of a plan's times.
         self.way = 1.0 if plan.dt > 0.0 else -1.0
+        #: What locates changes of sign of an event in place of ``located``: the core.
+        self.locator: Callable[[int, Changes], tuple[Array, Array, Array]] | None = None
         self.stopped_at = np.full(plan.members, np.nan)
         #: Each quantity one state before those that are searched next; NaN where it is not known.
         self.before = np.full((len(events), plan.members), np.nan)
@@ -305,8 +307,11 @@ class Collected:
             v, y = self.trials.step(index, t[which], h, changes.v[..., which], changes.y[..., which])
             return self.quantity(e, t[which] + h, v, y, self.members.numbers(index)), v, y
 
-        ends = changes.low, changes.high, changes.g, changes.g_end
-        share, v, y = located(trial, *ends, changes.v_end, changes.y_end)
+        if self.locator is not None and len(member):
+            share, v, y = self.locator(e, changes)
+        else:
+            ends = changes.low, changes.high, changes.g, changes.g_end
+            share, v, y = located(trial, *ends, changes.v_end, changes.y_end)
         return Located(member, changes.step, share, t + np.where(share > AT_START, share, 0.0) * length, v, y)
 
     def stops(self) -> Array | None:

@@ -7,3 +7,5 @@ pub mod motion;
 pub(crate) mod resets;
 pub(crate) mod search;
 pub(crate) mod watch;
+
+pub use watch::{Brackets, locate};

@@ -439,6 +439,34 @@ impl<'a> Watch<'a> {
     }
 }
 
+/// Changes of sign of one quantity: members, and for each time, length of the step, both shares of it between which the change is,
+/// quantities there, and states of the step's start and of the part's end, one after the other.
+#[derive(Debug)]
+pub struct Brackets<'c> {
+    /// The members.
+    pub members: &'c [i64],
+    /// Time, length, both shares and both quantities.
+    pub numbers: &'c [f64],
+    /// Both states.
+    pub states: &'c [f64],
+}
+
+/// Locates changes of sign. Returns their shares of the steps, and the states there.
+pub fn locate(events: &Events, e: usize, brackets: &Brackets) -> (Vec<f64>, Vec<f64>) {
+    let n = events.numbers;
+    let each = brackets.members.iter().zip(brackets.numbers.chunks_exact(6)).zip(brackets.states.chunks_exact((2 * n).max(1)));
+    let changes = each.map(|((member, numbers), states)| {
+        let (start, end) = states.split_at(n);
+        let (t, h, [low, high, g_low, g_high]) = (numbers[0], numbers[1], [2, 3, 4, 5].map(|i| numbers[i]));
+        let (slope_low, slope_high, state) = (0.0, 0.0, end.to_vec());
+        let step = Step { member: *member as usize, number: 0, t, h, start: start.to_vec(), end: Vec::new(), window: None };
+        Change { step: Arc::new(step), part: Part { of: 0, low, high, g_low, g_high, slope_low, slope_high, state } }
+    });
+    let located = Watch::new(events).located(e, changes.collect());
+    let states = located.iter().flat_map(|one| one.state.iter().copied()).collect();
+    (located.iter().map(|one| one.share).collect(), states)
+}
+
 /// The states at shares of steps, and the quantity of an event there.
 fn trial<'s>(
     motion: &mut Motion,
