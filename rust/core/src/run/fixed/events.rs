@@ -18,7 +18,7 @@ use crate::{
 const STEPS_AT_ONCE: i64 = 64;
 
 /// Where the steps notice what may occur, so many are made at a time, at first and at least and at most; and no more than so many
-/// of all members of a group, which are much more than it takes to look at them.
+/// of all members of a group, beside which what is read of them is little.
 const NOTICED_AT_FIRST: i64 = 16;
 const NOTICED_AT_ONCE: [i64; 2] = [4, 64];
 const NOTICED_OF_GROUP: i64 = 1 << 11;
