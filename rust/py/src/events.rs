@@ -44,6 +44,7 @@ pub(crate) struct EventsOf<'py> {
     step: ValuesOf<'py>,
     rates: ValuesOf<'py>,
     numbers: usize,
+    groups: usize,
     begin: PyReadonlyArray1<'py, f64>,
     sign: f64,
 }
@@ -87,6 +88,7 @@ impl EventsOf<'_> {
             step: self.step.of_core(members)?,
             rates: self.rates.of_core(members)?,
             numbers: self.numbers,
+            groups: self.groups,
             begin: row(&self.begin, members)?,
             sign: self.sign,
             level: Level::choose().map_err(|unknown| core_error(unknown.into()))?,

@@ -63,20 +63,25 @@ class AdaptiveRun:
         numbers = 3 + prod(plan.system.v_shape) + prod(plan.system.y_shape)
         rows = sum(numbers * min(event.most, int(event.terminal) or pacing.budget) for event in self._events)
         checks.fits("the events", rows, plan.batch, "keep fewer of each by Event(…, most=…) or split the batch")
-        changing = any(event.then for event in self._events)
-        self._driver = driver = (_Resetting if changing else _Driver)(plan, self._events, pacing)
-        driver.keep = self._keep
-        looked = by_core.sought(driver)
+        driver = self._begun(plan, pacing)
+        looked = driver.sought()
         # A series is not looked at in the lanes, where its coefficients are.
-        if changing or self._keep is not None or plan.method.has_series or looked is None:
+        in_lanes = looked is not None and self._keep is None and not plan.method.has_series and driver.goes_in_lanes()
+        out = driver.made(looked, paces, v, y) if in_lanes and looked is not None else None
+        if out is None:
+            driver = self._begun(plan, pacing) if in_lanes else driver
             driver.locator = None if looked is None else partial(by_core.located, driver, looked)
             out = driver.run(paces, v, y)
-        else:
-            out = engine.adapt(plan, pacing, paces, v, y, make=partial(by_core.adapted, driver, looked))
-            out = driver.looked_again(out, paces, v, y)
         if plan.progress is not None:
             plan.progress(1.0)
         return out
+
+    def _begun(self, plan: engine.Plan, pacing: engine.Pacing) -> _Driver:
+        """A driver that has not found anything."""
+        changing = any(event.then for event in self._events)
+        self._driver = (_Resetting if changing else _Driver)(plan, self._events, pacing)
+        self._driver.keep = self._keep
+        return self._driver
 
     def write_to(self, run: Any) -> None:
         """Write events, and the times and statuses of members that they stopped, to the result."""
@@ -116,21 +121,29 @@ class _Driver(Collected):
         self._search(everyone, paces, v, y)
         return self.stepped(self.plan, self.pacing, everyone, paces, v, y)
 
-    def looked_again(self, out: engine.Adapted, paces: Array, v: Array, y: Array) -> engine.Adapted:
-        """A run by the core, with the events of the steps that it would have without saved times.
+    def sought(self) -> by_core.Sought | None:
+        """What the core is to look for; None where it cannot."""
+        return by_core.sought(self)
 
-        An extra step to a saved time with too large an error makes the next steps shorter; of such members events are found here.
+    def goes_in_lanes(self) -> bool:
+        """Whether the core may make this run with its events."""
+        return True
+
+    def made(self, sought: by_core.Sought, paces: Array, v: Array, y: Array) -> engine.Adapted | None:
+        """The run by the core; None if it is to be made here.
+
+        Its events are those of the steps without saved times. An extra step to a saved time with too large an error makes the
+        next ones shorter, so that events of such members are found here.
         """
-        if not (others := np.flatnonzero(self.other_steps)).size:
-            return out
-        if any(event.terminal for event in self.events):
-            self.clear()
-            self.stopped_at[:] = np.nan
-            return self.run(paces, v, y)
-        for entries in self.entries:
-            entries[:] = [each.some(~self.other_steps[each.member]) for each in entries]
-        self.count[:, others] = 0
-        self._search(others, paces, v, y)
+        out = engine.adapt(self.plan, self.pacing, paces, v, y, make=partial(by_core.adapted, self, sought))
+        others = np.flatnonzero(self.other_steps)
+        if len(others) and any(event.terminal or event.then for event in self.events):
+            return None
+        if len(others):
+            for entries in self.entries:
+                entries[:] = [each.some(~self.other_steps[each.member]) for each in entries]
+            self.count[:, others] = 0
+            self._search(others, paces, v, y)
         return out
 
     def _search(self, index: Whole, paces: Array, v: Array, y: Array) -> None:
@@ -286,6 +299,21 @@ class _Resetting(_Driver):
         self._recent, self._changes = np.array(self.begin, dtype=np.float64), np.zeros(total, dtype=np.int64)
         #: The number of the event at which a member is at rest; else −1.
         self._rests = np.full(total, -1)
+
+    def sought(self) -> by_core.Sought | None:
+        return by_core.sought(self, self._resets.new_states)
+
+    def goes_in_lanes(self) -> bool:
+        """Where a run goes on, or rates jump, parts begin otherwise than a run does; a control's sum would end at a change."""
+        return self.pacing.begins and self.jumps is None and self.plan.system.control is None
+
+    def made(self, sought: by_core.Sought, paces: Array, v: Array, y: Array) -> engine.Adapted | None:
+        try:
+            out = super().made(sought, paces, v, y)
+        except by_core.NoBeginningError:
+            return None
+        self._resets.take(self.rested, self._rests)
+        return out
 
     def run(self, paces: Array, v: Array, y: Array) -> engine.Adapted:
         system, total, batch = self.plan.system, self.plan.members, self.plan.batch

@@ -35,6 +35,10 @@ class OfCore(NamedTuple):
     most: int
 
 
+class NoBeginningError(Exception):
+    """The core cannot begin a part of a run by itself."""
+
+
 class Sought(NamedTuple):
     """All events of a run, and the motion of its members.
 
@@ -43,6 +47,7 @@ class Sought(NamedTuple):
         step: a step, of a time, a length and a state.
         rates: by how much a state changes in a step, likewise.
         numbers: how many numbers a state has.
+        groups: of how many groups of them adaptive steps know the largest size.
         begin: the times of step 0, one for all or one of each member.
         sign: −1 where the time of the run is negated.
     """
@@ -51,6 +56,7 @@ class Sought(NamedTuple):
     step: Values
     rates: Values
     numbers: int
+    groups: int
     begin: Array
     sign: float
 
@@ -85,7 +91,7 @@ def sought(search: Collected, new_states: dict[int, NewState] | None = None) -> 
         return None
     begin = np.ascontiguousarray(np.broadcast_to(plan.t0, plan.batch).reshape(-1) if np.ndim(plan.t0) else [plan.t0], np.float64)
     n = prod(plan.system.v_shape) + prod(plan.system.y_shape)
-    return Sought(events, both[0], both[1], n, begin, search.sign)
+    return Sought(events, both[0], both[1], n, engine.groups_of(plan), begin, search.sign)
 
 
 def _values(evaluated: Evaluated, numbers: list[Array]) -> Values | None:
@@ -103,6 +109,8 @@ def made(search: Collected, sought: Sought, model: _core.ModelSpec, plan: engine
 def adapted(search: Collected, sought: Sought, model: _core.ModelSpec, plan: engine.Plan, pacing: Any, arrays: Any) -> bool:
     """Make a run of adaptive steps, as ``_core.adapt``."""
     done, found = _core.adapt_and_look(model, plan, pacing, arrays, sought)
+    if not done and any(event.then for event in sought.events):
+        raise NoBeginningError
     take(search, found)
     return done
 

@@ -1,6 +1,7 @@
 //! Events: changes of sign of quantities along a motion. They are looked for between the states of steps, and located within a
 //! step by steps of other lengths from its start.
 
+pub(crate) mod course;
 pub mod evaluation;
 pub mod found;
 pub mod motion;

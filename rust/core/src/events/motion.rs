@@ -51,6 +51,8 @@ pub struct Events<'a> {
     pub rates: Values<'a>,
     /// How many numbers a state has, v before y.
     pub numbers: usize,
+    /// With adaptive steps: of how many groups of numbers the largest sizes are known.
+    pub groups: usize,
     /// The times of step 0.
     pub begin: Row<'a>,
     /// −1 where the time of the run is that of the events, negated.

@@ -11,12 +11,12 @@ use super::{
 };
 
 /// See `runs/events/resets.py` for these.
-const MOST_IN_A_STEP: usize = 1000;
-const SETTLED: f64 = 1.0 / (1u64 << 30) as f64;
-const LARGEST_RATIO: f64 = 1.0 - 1.0 / (1u64 << 20) as f64;
+pub(super) const MOST_IN_A_STEP: usize = 1000;
+pub(super) const SETTLED: f64 = 1.0 / (1u64 << 30) as f64;
+pub(super) const LARGEST_RATIO: f64 = 1.0 - 1.0 / (1u64 << 20) as f64;
 const LEAST_LEFT: f64 = 1.0 / (1u64 << 36) as f64;
 /// 2⁻¹⁰⁰.
-const NO_TIME: f64 = f64::from_bits((1023 - 100) << 52);
+pub(super) const NO_TIME: f64 = f64::from_bits((1023 - 100) << 52);
 const AT: f64 = 8.0;
 const MOST_AT_ONCE: usize = 100;
 const FURTHER: f64 = 1.0 / (1u64 << 10) as f64;
@@ -26,27 +26,27 @@ const FURTHER: f64 = 1.0 / (1u64 << 10) as f64;
 pub(crate) struct Memory {
     pub member: usize,
     /// The side from which it came to an event at which it is since that changed its state; 0 for others.
-    at: Vec<Side>,
+    pub(super) at: Vec<Side>,
     /// Whether the event leads it back to where it is.
-    led_back: Vec<bool>,
+    pub(super) led_back: Vec<bool>,
     /// Whether it has been there for a step or more, with the quantity at zero.
-    lain: Vec<bool>,
+    pub(super) lain: Vec<bool>,
     /// Each quantity at the state, and one step before; NaN where that is not known.
     pub now: Vec<f64>,
     pub before: Vec<f64>,
     /// Where it is at rest.
-    rest: Option<Resting>,
+    pub(super) rest: Option<Resting>,
     /// It does not go on, in this state.
     pub ended: bool,
     circle: Vec<bool>,
-    often_since: f64,
+    pub(super) often_since: f64,
 }
 
 /// An event at which a member is at rest, and since when.
 #[derive(Clone, Copy, Debug)]
-struct Resting {
-    event: usize,
-    since: f64,
+pub(super) struct Resting {
+    pub event: usize,
+    pub since: f64,
 }
 
 impl Memory {
@@ -92,13 +92,13 @@ impl Memory {
 }
 
 /// What a member is after an instant at which events occurred.
-struct After {
-    state: Vec<f64>,
-    at: Vec<Side>,
+pub(super) struct After {
+    pub state: Vec<f64>,
+    pub at: Vec<Side>,
     /// The last event that changed the state.
-    event: Option<usize>,
-    stops: bool,
-    circles: bool,
+    pub event: Option<usize>,
+    pub stops: bool,
+    pub circles: bool,
 }
 
 /// What ends a stretch: its share, infinite if nothing does, and the time.
@@ -113,11 +113,11 @@ struct Ahead {
 
 /// An instant of a member, and what occurs at it: for each event the side just before, whether it occurs, and the largest size
 /// of its quantity at the ends of the step.
-struct Instant {
-    at: Located,
-    side: Vec<f64>,
-    due: Vec<bool>,
-    size: Vec<f64>,
+pub(super) struct Instant {
+    pub at: Located,
+    pub side: Vec<f64>,
+    pub due: Vec<bool>,
+    pub size: Vec<f64>,
 }
 
 /// Where a member stops within a step.
@@ -128,7 +128,7 @@ enum Arrived {
 }
 
 /// As NumPy's, which returns NaN if one is.
-fn larger(a: f64, b: f64) -> f64 {
+pub(super) fn larger(a: f64, b: f64) -> f64 {
     if a.is_nan() || a > b { a } else { b }
 }
 
@@ -151,7 +151,7 @@ struct Made {
 }
 
 impl Watch<'_> {
-    fn changes_state(&self, e: usize) -> bool {
+    pub(super) fn changes_state(&self, e: usize) -> bool {
         self.motion.events.events[e].then.is_some()
     }
 
@@ -160,12 +160,12 @@ impl Watch<'_> {
         (0..self.events()).any(|e| self.changes_state(e))
     }
 
-    fn events(&self) -> usize {
+    pub(super) fn events(&self) -> usize {
         self.motion.events.events.len()
     }
 
     /// Whether the next occurrence, or the `more`-th after it, ends a member's run or changes its state.
-    fn ends(&mut self, e: usize, member: usize, more: usize) -> bool {
+    pub(super) fn ends(&mut self, e: usize, member: usize, more: usize) -> bool {
         let terminal = self.motion.events.events[e].terminal;
         self.changes_state(e) || (terminal > 0 && *self.count(e, member) + 1 + more as i64 >= terminal)
     }
@@ -190,7 +190,7 @@ impl Watch<'_> {
     }
 
     /// Whether an event holds a member where it is: at a new state, which was old before.
-    fn leads_back(&mut self, (e, side): (usize, Side), h: f64, new: At, old: &[f64]) -> bool {
+    pub(super) fn leads_back(&mut self, (e, side): (usize, Side), h: f64, new: At, old: &[f64]) -> bool {
         if side == 0.0 {
             return false;
         }
@@ -208,12 +208,12 @@ impl Watch<'_> {
     }
 
     /// Whether the event at which a member is at rest would hold it at this time.
-    fn holds(&mut self, memory: &Memory, e: usize, h: f64, at: At) -> bool {
+    pub(super) fn holds(&mut self, memory: &Memory, e: usize, h: f64, at: At) -> bool {
         !memory.led_back[e] || self.leads_back((e, memory.at[e]), h, at, at.state)
     }
 
     /// After which share of a time the event lets a member at rest go; infinite where it does not by its end.
-    fn let_go(&mut self, memory: &Memory, e: usize, within: f64, h: f64, at: At) -> f64 {
+    pub(super) fn let_go(&mut self, memory: &Memory, e: usize, within: f64, h: f64, at: At) -> f64 {
         if self.holds(memory, e, h, At { t: at.t + within, ..at }) {
             return f64::INFINITY;
         }
@@ -225,8 +225,25 @@ impl Watch<'_> {
         })
     }
 
+    /// An instant, with what occurs at it: of changes that are located at it or later in a part around it, the first says from which
+    /// side the quantity comes.
+    pub(super) fn instant(&mut self, at: Located, found: &[(Vec<Located>, Vec<Change>)], size: Vec<f64>) -> Instant {
+        let (mut side, mut due) = (Vec::new(), vec![false; found.len()]);
+        let here = At { member: at.step.member, t: at.t, state: &at.state };
+        for (e, (occurs, changes)) in found.iter().enumerate() {
+            side.push(sign(self.motion.g(e, here)));
+            let mut around = occurs.iter().zip(changes).filter(|(one, of)| of.part.low <= at.share && at.share <= one.share);
+            if let Some((one, of)) = around.next() {
+                let came = sign(of.part.g_low);
+                due[e] = one.share == at.share || came * side[e] <= 0.0;
+                side[e] = came;
+            }
+        }
+        Instant { at, side, due, size }
+    }
+
     /// Events that are due at an instant, in the order of the list, and those that they set off.
-    fn happen(&mut self, memory: &mut Memory, h: f64, instant: Instant, lies: &[Side]) -> After {
+    pub(super) fn happen(&mut self, memory: &mut Memory, h: f64, instant: Instant, lies: &[Side]) -> After {
         let Instant { at, mut side, mut due, size } = instant;
         let (member, events, t) = (memory.member, self.events(), at.t);
         let mut state = at.state.clone();
@@ -305,7 +322,7 @@ impl Watch<'_> {
 
     /// Notes what happens up to the first end of a stretch. `whole` is the length of its step, `way` the direction of time.
     fn ahead(&mut self, memory: &mut Memory, stretch: &Arc<Step>, at: &mut [Side], (whole, way): (f64, f64)) -> Ahead {
-        let (member, events, h) = (memory.member, self.events(), way * whole);
+        let (member, h) = (memory.member, way * whole);
         let (mut share, mut returns) = (f64::INFINITY, None);
         let (mut found, mut size, mut zero_at_end) = (Vec::new(), Vec::new(), Vec::new());
         let (start, end) =
@@ -351,18 +368,9 @@ impl Watch<'_> {
                 }
             }
         }
-        let (mut side, mut due) = (Vec::new(), vec![false; events]);
-        for (e, (occurs, changes)) in found.iter().enumerate() {
-            side.push(sign(self.motion.g(e, At { member, t: here.t, state: &here.state })));
-            let mut around = occurs.iter().zip(changes).filter(|(one, of)| of.part.low <= share && share <= one.share);
-            if let Some((one, of)) = around.next() {
-                let came = sign(of.part.g_low);
-                due[e] = one.share == share || came * side[e] <= 0.0;
-                side[e] = came;
-            }
-        }
         let t = here.t;
-        let after = self.happen(memory, h, Instant { at: here, side, due, size }, at);
+        let instant = self.instant(here, &found, size);
+        let after = self.happen(memory, h, instant, at);
         let share = if returns.is_some() { f64::INFINITY } else { share };
         Ahead { share, t, after, zero_at_end, returns }
     }
@@ -579,7 +587,7 @@ impl Watch<'_> {
         };
         if let Some(t) = stops_at {
             self.found.stopped_at[member - self.first] = t;
-            each.stop = Some(Stop { step, t, state: state.clone() });
+            each.stop = Some(Stop::at(step, t, state.clone()));
         }
         memory.before.fill(f64::NAN);
         memory.now = self.all_g(At { member, t: end, state: &state });

@@ -86,6 +86,16 @@ pub(crate) struct Stop {
     pub step: Arc<Step>,
     pub t: f64,
     pub state: Vec<f64>,
+    /// Whether it goes on from there, and since when it has had this state.
+    pub goes_on: bool,
+    pub since: f64,
+}
+
+impl Stop {
+    /// Where it ends.
+    pub(super) fn at(step: Arc<Step>, t: f64, state: Vec<f64>) -> Stop {
+        Stop { step, t, state, goes_on: false, since: t }
+    }
 }
 
 /// The events of some members, by one thread.
@@ -389,7 +399,7 @@ impl<'a> Watch<'a> {
         for end in &ends {
             self.found.stopped_at[end.step.member - self.first] = end.t;
         }
-        ends.into_iter().map(|Located { step, t, state, .. }| Stop { step, t, state }).collect()
+        ends.into_iter().map(|Located { step, t, state, .. }| Stop::at(step, t, state)).collect()
     }
 
     /// Counts one, and keeps it if it is among the first.

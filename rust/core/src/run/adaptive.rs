@@ -381,6 +381,7 @@ impl<'a> Worker<'a> {
         if let Some(looks) = &mut self.looks {
             // A held step was looked at before, up to the last time of the run that goes on.
             looks.begin(lane, at, if pace.held > 0.0 { pace.target } else { f64::NEG_INFINITY });
+            looks.begin_course(lane, at, [pace.t, plan.at.last().map_or(f64::NAN, |row| row.at(at))], &state);
         }
         self.group.set_pace(lane, Pace { target: pace.t, wall: next.map_or(f64::INFINITY, |row| row.at(at)), ..pace });
         Assignment {
@@ -405,6 +406,9 @@ impl<'a> Worker<'a> {
         loop {
             if let Some(stop) = assigned.stop.take() {
                 self.end_at(part, lane, &mut assigned, &stop);
+                if stop.goes_on {
+                    continue;
+                }
                 match self.next_member(part, lane, waiting, go_on)? {
                     Some(next) => assigned = next,
                     None => return Ok(None),
@@ -455,7 +459,12 @@ impl<'a> Worker<'a> {
                 }
             }
             match self.stop_in_held(part, lane, &assigned, &pace) {
-                Some(stop) => self.end_at(part, lane, &mut assigned, &stop),
+                Some(stop) => {
+                    self.end_at(part, lane, &mut assigned, &stop);
+                    if stop.goes_on {
+                        continue;
+                    }
+                }
                 None => self.end(part, lane, &assigned, &pace, is_full.then_some(Status::Full)),
             }
             match self.next_member(part, lane, waiting, go_on)? {
@@ -583,19 +592,30 @@ impl<'a> Worker<'a> {
         if ends { looks.held(&*self.group, lane, member, pace, last.at(member)) } else { None }
     }
 
-    /// Ends a member where an event stopped it: in that state, also at all later times.
-    fn end_at(&self, part: &mut Part, lane: usize, assigned: &mut Assignment, stop: &EventStop) {
-        let member = part.first + assigned.member;
+    /// Ends a member where an event stopped it: in that state, also at all later times. Or it goes on from there, as a run begins.
+    fn end_at(&mut self, part: &mut Part, lane: usize, assigned: &mut Assignment, stop: &EventStop) {
+        let (member, times) = (part.first + assigned.member, self.plan.at.len());
         for (i, at) in self.plan.at.iter().enumerate() {
-            if at.at(member) >= stop.t {
+            if at.at(member) >= stop.since {
                 assigned.next = i;
                 self.write(part, assigned, &stop.state);
             }
         }
-        assigned.next = self.plan.at.len();
-        let pace = self.group.pace(lane);
         let accepted = (stop.step.number + 1) as f64;
-        self.end(part, lane, assigned, &Pace { t: stop.t, accepted, work: f64::NAN, ..pace }, None);
+        let pace = Pace { t: stop.t, accepted, work: f64::NAN, ..self.group.pace(lane) };
+        if stop.goes_on {
+            assigned.next = self.plan.at.iter().position(|at| at.at(member) >= stop.t).unwrap_or(times);
+            self.group.set_state(lane, &stop.state);
+            self.group.set_pace(lane, pace.again());
+            self.group.begin(&self.plan.model.spec, lane, member);
+            let mut scales = self.group.scales(lane);
+            let before = self.looks.as_mut().map(|looks| looks.go_on(lane)).unwrap_or_default();
+            scales.iter_mut().zip(before).for_each(|(size, before)| *size = size.max(before));
+            self.group.set_scales(lane, &scales);
+            return;
+        }
+        assigned.next = times;
+        self.end(part, lane, assigned, &pace, None);
         for (row, number) in stop.state.iter().enumerate() {
             part.state.row(row)[assigned.member] = *number;
         }

@@ -6,6 +6,8 @@ use crate::tape::number::Number;
 /// A new step is at least and at most so many times the old one.
 pub(crate) const MIN_FACTOR: f64 = 0.2;
 pub(crate) const MAX_FACTOR: f64 = 5.0;
+/// See `runs/engine/adaptive.py`.
+const BLIND: f64 = 1.0 / (1u64 << 20) as f64;
 /// The first step, and one after a jump, is at least so many times the time: 2¹² roundings.
 pub(crate) const MOVES: f64 = 1.0 / (1u64 << 40) as f64;
 
@@ -139,6 +141,13 @@ impl Pace<f64> {
         let h = if series { self.h } else { longer(first, least) };
         let before = if series { MIN_FACTOR * self.before } else { 1.0 };
         Pace { t: after, wall, h, before, most: MAX_FACTOR, ..self }
+    }
+
+    /// Where a member begins again at its time, with a first step that is to be chosen: see `begun_again` in `runs/engine/adaptive.py`.
+    #[must_use]
+    pub(crate) fn again(self) -> Self {
+        let (t, wall, none) = (self.t, f64::INFINITY, 0.0);
+        Pace { h: -BLIND, target: t, extra: none, held: none, begin: t, wall, before: 1.0, most: MAX_FACTOR, ..self }
     }
 
     /// The same where nothing runs.

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use crate::{
     events::{
+        course::Course,
         evaluation::Filled,
         motion::{Event, Events, States, Values, finite},
         search::bends,
@@ -44,6 +45,9 @@ pub(super) struct Looks<'a> {
     lengths: Vec<f64>,
     /// The lanes that have just made a step, with their members.
     made: Vec<(usize, usize)>,
+    /// If events change states: the run of each lane's member, and the largest sizes of its groups before an attempt, in rows.
+    courses: Vec<Option<Course>>,
+    longest: Vec<f64>,
 }
 
 impl<'a> Looks<'a> {
@@ -72,7 +76,22 @@ impl<'a> Looks<'a> {
             states: Vec::new(),
             lengths: row(),
             made: Vec::new(),
+            courses: (0..lanes).map(|_| None).collect(),
+            longest: Vec::new(),
         }
+    }
+
+    /// Where events change the state of a lane's member: its run begins in this state, at a time and until another.
+    pub(super) fn begin_course(&mut self, lane: usize, member: usize, times: [f64; 2], state: &[f64]) {
+        if self.watch.changes() {
+            self.courses[lane] = Some(self.watch.course(member, times, state));
+        }
+    }
+
+    /// The member of a lane goes on in another state. Returns the largest sizes of its groups in the part before.
+    pub(super) fn go_on(&mut self, lane: usize) -> Vec<f64> {
+        (self.fresh[lane], self.since[lane]) = (true, f64::NEG_INFINITY);
+        self.longest.iter().skip(lane).step_by(self.t.len()).copied().collect()
     }
 
     /// Takes a member into a lane, which an earlier run looked at until that time.
@@ -146,6 +165,11 @@ impl<'a> Looks<'a> {
         fill(&mut self.rejected, Some(row(places.rejected)), 1.0);
         self.states.clear();
         (0..n).for_each(|i| self.states.extend_from_slice(group.row(i).unwrap_or_default()));
+        if self.watch.changes() {
+            let first = n + Pace::<f64>::NUMBERS;
+            self.longest.clear();
+            (first..first + self.events.groups).for_each(|i| self.longest.extend_from_slice(group.row(i).unwrap_or_default()));
+        }
         if !self.fresh.contains(&true) {
             return;
         }
@@ -196,7 +220,8 @@ impl<'a> Looks<'a> {
             for (e, quantity) in self.quantities.iter_mut().enumerate() {
                 let (before, g, next) = (quantity.before[lane], quantity.now[lane], quantity.value.values[lane]);
                 let slopes = [quantity.slopes_before[lane] * stretched, quantity.slopes[lane]];
-                if may_change(before, g, next) || bends([g, next], slopes) {
+                let is_special = self.courses[lane].as_ref().is_some_and(|course| course.is_special(e, self.t[lane]));
+                if may_change(before, g, next) || bends([g, next], slopes) || is_special {
                     events.push((e, [g, next]));
                 }
                 (quantity.before[lane], quantity.now[lane]) = (g, next);
@@ -224,6 +249,12 @@ impl<'a> Looks<'a> {
         if candidates.is_empty() {
             return Vec::new();
         }
+        if self.watch.changes() {
+            let (watch, courses) = (&mut self.watch, &mut self.courses);
+            let stop =
+                |(lane, candidates): (usize, _)| Some((lane, watch.take_with_changes(courses[lane].as_mut()?, candidates)?));
+            return candidates.into_iter().filter_map(stop).collect();
+        }
         let (lanes, candidates): (Vec<usize>, Vec<Candidates>) = candidates.into_iter().unzip();
         let members: Vec<usize> = candidates.iter().map(|each| each.step.member).collect();
         let lane_of = |member: usize| members.iter().position(|each| *each == member).map_or(0, |i| lanes[i]);
@@ -249,7 +280,8 @@ impl<'a> Looks<'a> {
             let [g, next] = [&from, &there].map(|at| motion.quantity(e, at)[0]);
             let slopes = [&from, &there].map(|at| motion.slopes(e, at, &[h])[0]);
             let before = if self.fresh[lane] { f64::NAN } else { quantity.before[lane] };
-            if may_change(before, g, next) || bends([g, next], slopes) {
+            let is_special = self.courses[lane].as_ref().is_some_and(|course| course.is_special(e, pace.t));
+            if may_change(before, g, next) || bends([g, next], slopes) || is_special {
                 events.push((e, [g, next]));
             }
         }
