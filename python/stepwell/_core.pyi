@@ -34,6 +34,7 @@ __all__ = [
     "isa",
     "isa_levels",
     "listen",
+    "locate",
     "names_device",
     "operations",
     "prepared",
