@@ -164,3 +164,17 @@ def test_trials_of_fused_attempts_fuse_what_attempts_do(method: str) -> None:
     run, reference = (sw.integrate(system, method, backend=backend, **options) for backend in ("rust", "numpy"))
     assert np.sum(run.events["passed"].count) > 10
     assert_same_run(run, reference)
+
+
+def test_a_ball_comes_to_rest_as_the_reference_says() -> None:
+    """Bounces with restitution 0.5 have a limit in time, and lie there: the series is summed, in one step and over many parts."""
+    falling = sw.system(order=2)(lambda t, v, y: -1.0 + 0.0 * y)()
+    bounce = sw.Event(lambda t, v, y: y, direction=-1, then=lambda t, v, y: (-0.5 * v, y), name="bounce")
+    for method, steps in (("rk4", {"dt": 0.37, "steps": 20}), ("merson", {"tolerance": 1e-6, "at": [6.0]})):
+        options: Any = {"v": [0.0, 0.5], "y": [0.5, 0.25], "events": bounce, **steps}
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", sw.EventWarning)
+            run, reference = (sw.integrate(falling, method, backend=backend, **options) for backend in ("rust", "numpy"))
+        assert_same_run(run, reference)
+        assert [str(each) for each in run.findings] == [str(each) for each in reference.findings]
+        assert np.all(run.status == sw.Status.REST), method
