@@ -178,3 +178,36 @@ def test_a_ball_comes_to_rest_as_the_reference_says() -> None:
         assert_same_run(run, reference)
         assert [str(each) for each in run.findings] == [str(each) for each in reference.findings]
         assert np.all(run.status == sw.Status.REST), method
+
+
+@pytest.mark.parametrize("backend", ["rust", "numpy"])
+def test_a_series_of_bounces_that_ends_with_a_step_rests_there(backend: Any) -> None:
+    """Bounces of a ball with restitution 1/2 that falls from 1/2 end at t = 1 + 2 = 3, where the tenth step of 0.3 ends."""
+    falls = sw.system(lambda t, v, y: -1.0 + 0.0 * y)()
+    ground = sw.Event(lambda t, v, y: y, direction=-1, then=lambda t, v, y: (-0.5 * v, y))
+    for dt in (0.3, 0.6, 3.0 / 7.0, np.nextafter(0.3, 0.0), np.nextafter(0.3, 1.0), 0.37):
+        with pytest.warns(sw.EventWarning, match="came to rest .* at t = 3:"):
+            run = sw.integrate(falls, "rk4", v=0.0, y=0.5, dt=dt, steps=20, events=ground, backend=backend)
+        assert abs(run.stopped_at - 3.0) < 1e-9
+        assert run.status == sw.Status.REST
+        assert abs(run.v[-1]) < 1e-12 > abs(run.y[-1])
+        assert ": finite, came to rest at an event>" in repr(run)
+    world = sw.World(falls, "rk4", v=np.zeros(2), y=np.array([0.5, 0.7]), dt=0.3, events=ground)
+    world.step(20)
+    assert (np.abs(world.y) < 1e-12).all()
+
+
+@pytest.mark.parametrize("backend", ["rust", "numpy"])
+@pytest.mark.parametrize("steps", [{"dt": 0.3, "steps": 20}, {"tolerance": 1e-6, "at": [6.0]}])
+def test_what_begins_at_an_event_that_turns_nothing_back_goes_through(backend: Any, steps: dict[str, Any]) -> None:
+    """At rest on the line and pushed across: a ball on the ground stays, what is damped there, or only counted, falls."""
+    falls, method = sw.system(lambda t, v, y: -1.0 + 0.0 * y)(), "rk4" if "dt" in steps else "merson"
+    for factor in (0.9, 1.0):
+        line = sw.Event(lambda t, v, y: y, direction=-1, then=lambda t, v, y, by=factor: (by * v, y), name="line")
+        run = sw.integrate(falls, method, v=0.0, y=0.0, events=line, backend=backend, **steps)
+        assert (run.status, run.events["line"].count) == (sw.Status.OK, 0)
+        np.testing.assert_allclose((run.v[-1], run.y[-1]), (-6.0, -18.0), rtol=1e-12)
+    ground = sw.Event(lambda t, v, y: y, direction=-1, then=lambda t, v, y: (-0.9 * v, y))
+    with pytest.warns(sw.EventWarning, match="came to rest .* at t = 0"):
+        run = sw.integrate(falls, method, v=0.0, y=0.0, events=ground, backend=backend, **steps)
+    assert (run.v[-1], run.y[-1], run.status) == (0.0, 0.0, sw.Status.REST)

@@ -418,12 +418,8 @@ class Run(ValueEquality):
 
     def _summary(self) -> list[tuple[str, str]]:
         """Steps, time, saved states, members and how they ended, each with its name."""
-        diverged = (self.status != 0) & (self.status != Status.EVENT)
-        members, bad, stopped = (
-            self.status.size,
-            int(np.count_nonzero(diverged)),
-            int(np.count_nonzero(self.status == Status.EVENT)),
-        )
+        diverged = ~np.isin(self.status, (Status.OK, Status.EVENT, Status.REST))
+        members, bad = self.status.size, int(np.count_nonzero(diverged))
         if self.paces is None:
             steps = f"{counted(self.steps, 'step')} of {self.dt:g}"
             begins, ends = self.t0 + self.start_step * self.dt, self.t0 + (self.start_step + self.steps) * self.dt
@@ -437,8 +433,9 @@ class Run(ValueEquality):
         when = "" if number is None or np.ndim(self.t0) else f" (t = {self.t0 + number * self.dt:g})"
         at = "" if number is None else f"{', the first' if bad > 1 else ''} at step {number}{when}"
         verdict = "finite" if not bad else f"{ending}{at}" if members == 1 else f"{bad} of {members} {ending}{at}"
-        if stopped:
-            verdict += f", {stopped} of {members} stopped at an event" if members > 1 else ", stopped at an event"
+        for status, what in ((Status.EVENT, "stopped at an event"), (Status.REST, "came to rest at an event")):
+            if some := int(np.count_nonzero(self.status == status)):
+                verdict += f", {some} of {members} {what}" if members > 1 else f", {what}"
         return [
             ("steps", steps + (", fused" if self.fused else "") + ("" if self.dtype == "float64" else f", {self.dtype}")),
             ("time", f"{first:g} to {last:g}"),

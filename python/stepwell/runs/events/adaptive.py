@@ -468,6 +468,12 @@ class _Resetting(_Driver):
         led_back = np.flatnonzero((side != 0.0) & self._resets.led_back[e, steps.member])
         stuck = np.union1d(stuck, led_back)
         soon = (self._side(e, parts) != 0.0) & (parts.high <= NO_TIME)
+        which = np.flatnonzero(soon & ~np.isin(parts.member, steps.member[stuck]))
+        some = parts.some(which)
+        leaves = ~self._resets.bounces(e, some.t, some.h, (some.v, some.y), some.member, self._resets.at[e, some.member])
+        self._resets.at[e, some.member[leaves]] = 0.0
+        stays = np.delete(np.arange(len(soon)), which[leaves])
+        parts, soon = parts.some(stays), soon[stays]
         if not len(stuck) and not soon.any():
             return parts
         # A member that returns in no time is at the event where its step begins, and nothing else happens to it before.

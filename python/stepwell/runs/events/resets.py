@@ -21,7 +21,8 @@ MOST_IN_A_STEP = 1000
 #: the limit of the geometric series of times and states, if that is within the step.
 SETTLED, LARGEST_RATIO = 2.0**-30, 1.0 - 2.0**-20
 #: If less than this share of a step is left after an event, that event is not searched there, since the motion may be less than
-#: roundings. The search goes on from the start of the next step, as from where the state was changed.
+#: roundings. The search goes on from the start of the next step, as from where the state was changed; and from that state, if the
+#: event would have occurred again.
 LEAST_LEFT = 2.0**-36
 #: A member that returns to an event within this share of its step does so in no time.
 NO_TIME = 2.0**-100
@@ -92,13 +93,13 @@ class After(NamedTuple):
 class Ahead(NamedTuple):
     """What ends some stretches: the share of each, infinite if nothing does, the time, and what members are after it.
 
-    ``zero_at_end`` is whether each quantity is zero where a stretch ends without that.
+    ``g_end`` is each quantity where a stretch ends without that.
     """
 
     share: Array
     t: Array
     after: After
-    zero_at_end: Any
+    g_end: Array
 
 
 class Arrived(NamedTuple):
@@ -310,13 +311,28 @@ class Resets:
             for before, after, change in zip(old, new, rates, strict=True):
                 same = np.abs(after - before) <= LEAST_LEFT * (np.abs(after) + np.abs(change))
                 holds &= same.all(axis=tuple(range(same.ndim - 1)))
-            v, y = (block + FURTHER * change for block, change in zip(new, rates, strict=True))
-            t_further = t + FURTHER * h
-            back = self.new_states[e](run.sign * t_further, v, y, numbers)
+            t_further, *states = self._further(e, t, h, new, rates, member)
             g = run.quantity(e, t, *new, numbers)
-            g_further, g_back = (run.quantity(e, t_further, *state, numbers) for state in ((v, y), back))
+            g_further, g_back = (run.quantity(e, t_further, *state, numbers) for state in states)
             across = side * (g - g_further)
             return holds & (across > 0.0) & (side * (g_back - g_further) >= 0.5 * across)
+
+    def bounces(self, e: int, t: Array, h: Array, state: State, member: Whole, side: Array) -> Any:
+        """Whether an event turns members back that begin at it, at rest, and are pushed across it.
+
+        A little later its change of the state must lead to their side. A damping, as of v to 0.9 v, does not.
+        """
+        if not len(member):
+            return np.zeros(0, dtype=bool)
+        with np.errstate(all="ignore"):
+            t, _, back = self._further(e, t, h, state, self._run.trials.rates(member, t, h, *state), member)
+            return side * self._run.slope(e, member, t, h, *back) > 0.0
+
+    def _further(self, e: int, t: Array, h: Array, state: State, rates: State, member: Whole) -> tuple[Array, State, State]:
+        """A little later: the time, the state there by these rates, and that which an event makes of it."""
+        t = t + FURTHER * h
+        v, y = (block + FURTHER * change for block, change in zip(state, rates, strict=True))
+        return t, (v, y), self.new_states[e](self._run.sign * t, v, y, self._run.members.numbers(member))
 
     def through(self, stretch: Stretch) -> Arrived:
         """Make one step of some members again, with its events."""
@@ -357,18 +373,20 @@ class Resets:
             flight, ratio = np.where(free, np.nan, flight), np.where(free, np.nan, ratio)
             rest, stop = (returns >= 0) & ~free, (returns < 0) & (after.stops | after.circles)
             goes_on, arrives = ((returns < 0) & ends & ~stop) | free, (returns < 0) & ~ends
+            soon = np.abs(stretch.h) < LEAST_LEFT * step[live]
+            falls = soon & (stretch.at * ahead.g_end < 0.0).any(axis=0)
+            start, ends_at = (stretch.v, stretch.y), (stretch.v_end, stretch.y_end)
             for which, t, state in (
-                (rest, stretch.t, (stretch.v, stretch.y)),
+                (rest, stretch.t, start),
                 (stop, ahead.t, (after.v, after.y)),
-                (arrives, np.full(len(live), np.nan), (stretch.v_end, stretch.y_end)),
+                (arrives, np.full(len(live), np.nan), [np.where(falls, *each) for each in zip(start, ends_at, strict=True)]),
             ):
                 who = live[which]
                 times[who], v[..., who], y[..., who] = t[which], state[0][..., which], state[1][..., which]
             rests[live[rest]], rests[live[after.circles]] = returns[rest], after.event[after.circles]
             at[:, live[rest]] = stretch.at[:, rest]
-            soon = np.abs(stretch.h) < LEAST_LEFT * step[live]
             at[:, live[arrives & soon]] = stretch.at[:, arrives & soon]
-            lies, far = (stretch.at != 0.0) & ahead.zero_at_end, arrives & ~soon
+            lies, far = (stretch.at != 0.0) & (ahead.g_end == 0.0), arrives & ~soon
             at[:, live[far]], self.lain[:, stretch.member[far]] = np.where(lies, stretch.at, 0.0)[:, far], lies[:, far]
             if not goes_on.any():
                 break
@@ -407,7 +425,7 @@ class Resets:
         """Note what happens up to the first end of each stretch. Returns the ends, and the event that holds a member, else −1."""
         run, n = self._run, len(stretch.member)
         share, returns, rows = np.full(n, np.inf), np.full(n, -1), np.arange(n)
-        numbers, found, sizes, zero_at_end = run.members.numbers(stretch.member), [], [], []
+        numbers, found, sizes, g_ends = run.members.numbers(stretch.member), [], [], []
         ones, zeros = np.ones(n), np.zeros(n)
         t0 = np.broadcast_to(run.plan.t0, run.plan.batch).reshape(-1)[stretch.member]
         step_end = t0 + (stretch.step + 1) * run.plan.dt
@@ -434,10 +452,17 @@ class Resets:
                 again = (stretch.at[e, changes.place] != 0.0) & (
                     self._way * (occurs.t - stretch.t[changes.place]) <= NO_TIME * step[changes.place]
                 )
-                returns[changes.place[again]] = e
+                again &= returns[changes.place] != e
+                place = changes.place[again]
+                some, h = stretch.some(place), self._way * step[place]
+                bounces = self.bounces(e, some.t, h, (some.v, some.y), some.member, some.at[e])
+                returns[place[bounces]], stretch.at[e, place[~bounces]] = e, 0.0
+                stays = ~again
+                stays[again] = bounces
+                occurs, changes = occurs.some(stays), changes.some(stays)
             found.append((occurs, changes))
             sizes.append(np.maximum(np.abs(g), np.abs(g_end)))
-            zero_at_end.append(g_end == 0.0)
+            g_ends.append(g_end)
             ends = run.ends(e, occurs.member)
             np.minimum.at(share, changes.place[ends], occurs.share[ends])
         wakes = self._wakes(stretch, returns, step, share, found)
@@ -452,7 +477,7 @@ class Resets:
         at = Located(stretch.member, stretch.step, share, t, v, y)
         after = self.happen(at, self._way * step, *run.sides_before(found, at), np.array(sizes), stretch.at)
         share[returns >= 0] = np.inf
-        return Ahead(share, t, after, np.array(zero_at_end)), returns
+        return Ahead(share, t, after, np.array(g_ends)), returns
 
     def _wakes(self, stretch: Stretch, returns: Whole, step: Array, share: Array, found: list[tuple[Located, Changes]]) -> Any:
         """Which members that are held meet an event at a known time: they stay until then. Nothing else happens to them."""

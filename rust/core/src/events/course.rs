@@ -125,8 +125,8 @@ impl Watch<'_> {
     }
 
     /// The parts of a step in which an event changes its sign, and that at its start if the member returns there in no time.
-    fn of_part(&mut self, course: &Course, e: usize, step: &Arc<Step>, g: [f64; 2]) -> Vec<Change> {
-        let (memory, begins, is_zero) = (&course.memory, step.t == course.start, g[0] == 0.0);
+    fn of_part(&mut self, course: &mut Course, e: usize, step: &Arc<Step>, g: [f64; 2]) -> Vec<Change> {
+        let (memory, begins, is_zero) = (&mut course.memory, step.t == course.start, g[0] == 0.0);
         let side = if begins || is_zero { memory.at[e] } else { 0.0 };
         let lies = is_zero && (!begins || memory.lain[e]);
         let start = At { member: memory.member, t: step.t, state: &step.start };
@@ -135,6 +135,9 @@ impl Watch<'_> {
             && (!stuck.is_empty() || memory.led_back[e] || (lies && self.leads_back((e, side), step.h, start, start.state)));
         let is_soon = |change: &Change| begins && memory.at[e] != 0.0 && change.part.high <= NO_TIME;
         let (mut there, parts): (Vec<Change>, Vec<Change>) = parts.into_iter().partition(is_soon);
+        if !is_held && !there.is_empty() && !self.bounces((e, side), step.h, start) {
+            (memory.at[e], there) = (0.0, Vec::new());
+        }
         if is_held {
             let (low, high, [g_low, g_high], [slope_low, slope_high]) = (0.0, 1.0, g, [0.0; 2]);
             let part = Part { of: 0, low, high, g_low, g_high, slope_low, slope_high, state: Vec::new() };

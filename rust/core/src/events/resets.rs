@@ -106,7 +106,8 @@ struct Ahead {
     share: f64,
     t: f64,
     after: After,
-    zero_at_end: Vec<bool>,
+    /// Each quantity where it ends.
+    g_end: Vec<f64>,
     /// The event that holds the member.
     returns: Option<usize>,
 }
@@ -199,12 +200,25 @@ impl Watch<'_> {
         if !each.all(|((before, after), change)| (after - before).abs() <= LEAST_LEFT * (after.abs() + change.abs())) {
             return false;
         }
-        let state: Vec<f64> = new.state.iter().zip(change).map(|(x, change)| x + FURTHER * change).collect();
-        let further = At { t: new.t + FURTHER * h, state: &state, ..new };
-        let back = self.motion.changed(e, further);
-        let [g, g_further, g_back] = [new, further, At { state: &back, ..further }].map(|at| self.motion.g(e, at));
+        let (t, state, back) = self.further(e, h, new);
+        let [further, back] = [&state, &back].map(|state| At { t, state, ..new });
+        let [g, g_further, g_back] = [new, further, back].map(|at| self.motion.g(e, at));
         let across = side * (g - g_further);
         across > 0.0 && side * (g_back - g_further) >= 0.5 * across
+    }
+
+    /// Whether an event turns a member back that begins at it, at rest, and is pushed across it.
+    pub(super) fn bounces(&mut self, (e, side): (usize, Side), h: f64, at: At) -> bool {
+        let (t, _, back) = self.further(e, h, at);
+        side * self.motion.slope(e, At { t, state: &back, ..at }, h) > 0.0
+    }
+
+    /// A little later: the time, the state there by the rates here, and that which an event makes of it.
+    fn further(&mut self, e: usize, h: f64, at: At) -> (f64, Vec<f64>, Vec<f64>) {
+        let (t, change) = (at.t + FURTHER * h, self.motion.change(at, h));
+        let state: Vec<f64> = at.state.iter().zip(change).map(|(x, change)| x + FURTHER * change).collect();
+        let back = self.motion.changed(e, At { t, state: &state, ..at });
+        (t, state, back)
     }
 
     /// Whether the event at which a member is at rest would hold it at this time.
@@ -324,7 +338,7 @@ impl Watch<'_> {
     fn ahead(&mut self, memory: &mut Memory, stretch: &Arc<Step>, at: &mut [Side], (whole, way): (f64, f64)) -> Ahead {
         let (member, h) = (memory.member, way * whole);
         let (mut share, mut returns) = (f64::INFINITY, None);
-        let (mut found, mut size, mut zero_at_end) = (Vec::new(), Vec::new(), Vec::new());
+        let (mut found, mut size, mut g_ends) = (Vec::new(), Vec::new(), Vec::new());
         let (start, end) =
             (At { member, t: stretch.t, state: &stretch.start }, At { member, t: stretch.t + stretch.h, state: &stretch.end });
         for (e, side) in at.iter_mut().enumerate() {
@@ -341,13 +355,19 @@ impl Watch<'_> {
             if changes_state && (!stuck.is_empty() || (*side != 0.0 && memory.led_back[e])) {
                 returns = Some(e);
             }
-            let occurs = self.located(e, changes.clone());
-            let in_no_time = |one: &Located| way * (one.t - stretch.t) <= NO_TIME * whole;
-            if changes_state && *side != 0.0 && occurs.iter().any(in_no_time) {
-                returns = Some(e);
+            let mut occurs: Vec<(Located, Change)> = self.located(e, changes.clone()).into_iter().zip(changes).collect();
+            let in_no_time = |(one, _): &(Located, Change)| way * (one.t - stretch.t) <= NO_TIME * whole;
+            if changes_state && *side != 0.0 && returns != Some(e) && occurs.iter().any(in_no_time) {
+                if self.bounces((e, *side), h, start) {
+                    returns = Some(e);
+                } else {
+                    *side = 0.0;
+                    occurs.retain(|each| !in_no_time(each));
+                }
             }
+            let (occurs, changes): (Vec<Located>, Vec<Change>) = occurs.into_iter().unzip();
             size.push(larger(g.abs(), g_end.abs()));
-            zero_at_end.push(g_end == 0.0);
+            g_ends.push(g_end);
             for (more, one) in occurs.iter().enumerate() {
                 if self.ends(e, member, more) {
                     share = share.min(one.share);
@@ -372,7 +392,7 @@ impl Watch<'_> {
         let instant = self.instant(here, &found, size);
         let after = self.happen(memory, h, instant, at);
         let share = if returns.is_some() { f64::INFINITY } else { share };
-        Ahead { share, t, after, zero_at_end, returns }
+        Ahead { share, t, after, g_end: g_ends, returns }
     }
 
     /// Makes one step of a member again, with its events.
@@ -412,10 +432,12 @@ impl Watch<'_> {
                 return Arrived::Stops(ahead.t, ahead.after.state);
             } else if !ends {
                 if stretch.h.abs() < LEAST_LEFT * whole {
+                    let falls = at.iter().zip(&ahead.g_end).any(|(side, g)| side * g < 0.0);
                     memory.at = at;
+                    return Arrived::AtEnd(if falls { stretch.start.clone() } else { stretch.end.clone() });
                 } else {
                     for (e, side) in at.into_iter().enumerate() {
-                        memory.lain[e] = side != 0.0 && ahead.zero_at_end[e];
+                        memory.lain[e] = side != 0.0 && ahead.g_end[e] == 0.0;
                         memory.at[e] = if memory.lain[e] { side } else { 0.0 };
                     }
                 }
