@@ -51,6 +51,7 @@ registry.register(
     save_run="stepwell.interop.saving:save",
     state_jump="stepwell.analysis.state_jumps:why_short",
     state_jump_of="stepwell.analysis.state_jumps:finding_of",
+    states_of_run="stepwell.runs.between:states",
     stiffness_of="stepwell.analysis.stiffness:finding_of",
     watched="stepwell.analysis.growth:watched",
 )

@@ -1,6 +1,7 @@
 """Adaptive steps: the reference's bits, every member at its own pace, errors that follow the tolerance."""
 
 import itertools
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -344,6 +345,73 @@ def test_members_have_rows_of_their_own() -> None:
     run = ensemble()
     assert run.t.shape == run.y.shape == (2 + run.paces.accepted.max() // 2, 300)
     np.testing.assert_array_equal(run.t[[0, -1]], [[0.0] * 300, [5.0] * 300])
+
+
+@pytest.mark.parametrize("method", ["dop853", "merson", "rodas5p", "tsit5", "bs32"])
+def test_a_run_with_every_step_has_the_state_at_any_time(method: str) -> None:
+    """To the bit that of a run with ``at=`` these times: batches, options, stops, both directions, a run from a file."""
+    times = np.random.default_rng(3).uniform(0.0, 6.0, 40)
+    times[:3] = 0.0, 6.0, times[5]
+    order, hard = np.argsort(times), sw.Pendulum(omega=np.array([[1.0, 3.0, 0.5], [2.0, 1.5, 0.1]]))
+    driven = sw.Oscillator(a=sw.Sampled([0.0, 1.0, -1.0, 0.5], 1.7))
+    pushed = {"force": np.array([0.1, -0.2]), "tolerance": (1e-4, 1e-6), "dtype": "float32"}
+    event = sw.Event(lambda t, v, y: y, terminal=2, name="stop")
+    cases: list[tuple[sw.System, dict[str, Any]]] = [
+        (hard, {"v": 0.0, "y": 3.0}),
+        (driven, {"v": 0.0, "y": np.array([1.0, 2.0]), "jumps": [2.3, 4.9]}),
+        (sw.Oscillator(), {"v": 1.0, "y": 0.0, "jumps": np.array([[1.1, 2.2], [3.3, 4.4]])}),
+        (sw.Pendulum(), {"v": 1.0, "y": 0.0, "max_step": 0.37}),
+        (sw.Oscillator(), {"v": 0.0, "y": 1.0} | pushed),
+        (sw.Pendulum(), {"v": np.array([0.0, 2.1]), "y": 2.0, "events": event}),
+    ]
+    if method == "rodas5p":
+        cases = [each for each in cases if each[0] is hard]
+    for sign in (1.0, -1.0):
+        for system, options in cases:
+            if sign < 0.0 and (system is driven or options.get("jumps") is not None):
+                continue
+            ask: Any = {"tolerance": 1e-6, "max_steps": 4000} | options
+            whole = sw.integrate(system, method, at=sign * 6.0, every=1, **ask)
+            asked = sw.integrate(system, method, at=sign * np.append(np.unique(times[times > 0.0]), 6.0)[:-1], **ask)
+            v, y = whole(sign * times)
+            for one, saved, first in ((v, asked.v, whole.v[0]), (y, asked.y, whole.y[0])):
+                rows = np.searchsorted(sign * asked.t, times[order])
+                expected = np.where((times[order] == 0.0).reshape(-1, *(1,) * first.ndim), first, saved[rows])
+                np.testing.assert_array_equal(one[order], expected, err_msg=f"{system!r} {options}")
+            np.testing.assert_array_equal(whole(sign * times.reshape(4, 10))[1], y.reshape(4, 10, *y.shape[1:]))
+            np.testing.assert_array_equal(whole(sign * times[7])[0], v[7])
+
+
+def test_states_between_steps_of_a_run_from_a_file_and_of_one_that_goes_on(tmp_path: Path) -> None:
+    """Also first-order systems, for which it is y alone, members that stopped by themselves, and series."""
+    blow = sw.system(order=1)(lambda t, y: y * y)()
+    with pytest.warns(sw.ToleranceWarning):
+        run = sw.integrate(blow, "dop853", y=np.array([0.5, 1.0, 2.0]), tolerance=1e-9, at=1.5, every=1, max_steps=500)
+    y = run(np.array([0.1, 0.4, 0.9]))
+    exact = 1.0 / (1.0 / run.y[0] - np.array([[0.1], [0.4], [0.9]]))
+    np.testing.assert_allclose(y[:2], exact[:2], rtol=1e-8)
+    np.testing.assert_allclose(y[2, :2], exact[2, :2], rtol=1e-7)
+    assert np.isnan(y[2, 2])
+    run.save(tmp_path / "run.npz")
+    np.testing.assert_array_equal(sw.load(tmp_path / "run.npz", system=blow.definition)(0.4), y[1])
+    for method in ("taylor", "dop853"):
+        half = sw.integrate(sw.Oscillator(), method, v=0.0, y=1.0, tolerance=1e-10, at=3.0)
+        rest = sw.integrate(half.system, method, resume=half, at=7.0, every=1)
+        times = np.linspace(3.0, 7.0, 50)
+        np.testing.assert_allclose(rest(times)[1], np.cos(times), rtol=0, atol=1e-9)
+
+
+def test_states_between_steps_need_the_steps() -> None:
+    run = sw.integrate(sw.Oscillator(), "dop853", v=0.0, y=1.0, tolerance=1e-6, at=[3.0, 5.0])
+    whole = sw.integrate(sw.Oscillator(), "dop853", v=0.0, y=1.0, tolerance=1e-6, at=5.0, every=1)
+    bounce = sw.Event(lambda t, v, y: y, direction=-1, then=lambda t, v, y: (-v, y), name="bounce")
+    bounced = sw.integrate(sw.Oscillator(), "dop853", v=0.0, y=1.0, tolerance=1e-6, at=5.0, every=1, events=bounce)
+    for one in (run, whole.select(slice(3)), sw.integrate(sw.Oscillator(), "rk4", v=0.0, y=1.0, dt=0.1, steps=5, every=1)):
+        refused(UnsupportedError, "t: .* those of all steps, .* give tolerance= and every=1", one, 1.0)
+    refused(UnsupportedError, "not known after bounce changed the state; ask for the times by at=", bounced, 1.0)
+    refused(ArgumentError, "t: expected times within the run, 0 to 5, got 5.1", whole, [1.0, 5.1])
+    refused(ArgumentError, "t: expected times within the run, 0 to 5, got -0.1", whole, -0.1)
+    assert whole([])[0].shape == (0,)
 
 
 def test_room_does_not_change_a_bit(monkeypatch: pytest.MonkeyPatch) -> None:

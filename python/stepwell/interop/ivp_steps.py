@@ -14,6 +14,7 @@ from ..errors import ArgumentError, ShapeError
 from ..reference import adaptive
 from ..runs import engine
 from ..runs.adaptive import paces_of
+from ..runs.between import by_steps
 from ..runs.diagnostics import may_be_stiff
 from ..runs.request import Request
 
@@ -103,16 +104,10 @@ class Trajectory:
         if not len(times):
             return np.empty((len(self._last), 0))
         steps = np.searchsorted(self.times, times, side="right") - 1
-        since, pacing = self.times[steps], self._pacing._replace(at=times[np.newaxis], every=0, waypoints=False)
-        if (jumps := engine.jumps_of(self._plan, pacing)) is not None:
-            since = np.maximum(since, np.append(-np.inf, jumps.after)[jumps.passed(since)])
+        since, start = self.times[steps], (np.empty((0, len(times))), self.states[steps].T)
         self._between += int((since < times).sum())
         paces = np.repeat(self._paces[:, np.newaxis], len(times), axis=1)
-        # A step that goes beyond the time is held, and only the extra step to there is made.
-        paces[engine.TIME], paces[engine.STEP], paces[engine.HELD], paces[engine.EXTRA] = since, 2.0 * (times - since), 1.0, 0.0
-        start = np.empty((0, len(times))), np.ascontiguousarray(self.states[steps].T)
-        states: Array = engine.adapt(self._plan._replace(batch=times.shape), pacing, paces, *start).y[0]
-        return states
+        return by_steps(self._plan._replace(batch=times.shape), self._pacing, paces, since, times, *start)[1]
 
     def loses_to(self, requested: Callable[[], Request]) -> bool:
         """Whether another method would have come as far with a part of the attempts: see ``PART``."""

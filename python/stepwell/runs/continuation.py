@@ -79,15 +79,15 @@ class Continuation(NamedTuple):
         return all(a == b for a, b in zip_longest(one, other))
 
 
-def of(resume: Any) -> Continuation:
-    """Where a run or a world stands, from which another goes on.
+def of(resume: Any, *, stopped: bool = False) -> Continuation:
+    """Where a run or a world stands, from which another goes on; also of members that an event stopped, if ``stopped``.
 
     Raises:
         DTypeError: if it is neither.
         UnsupportedError: if a terminal event stopped a member, which has a time of its own.
     """
     if isinstance(resume, Run):
-        return _of_run(resume)
+        return _of_run(resume, stopped)
     if isinstance(resume, Continuation):
         return resume
     if (standing := getattr(resume, "_standing", None)) is None:
@@ -96,10 +96,10 @@ def of(resume: Any) -> Continuation:
     return here
 
 
-def _of_run(run: Run) -> Continuation:
+def _of_run(run: Run, goes_on_stopped: bool) -> Continuation:
     if run.is_part:
         raise ArgumentError("resume: expected a run with its last state, got a part of one without it, as of run.select")
-    if (stopped := int(np.count_nonzero(run.status >= Status.EVENT))) > 0:
+    if not goes_on_stopped and (stopped := int(np.count_nonzero(run.status >= Status.EVENT))) > 0:
         raise UnsupportedError(
             f"resume: {share(stopped, run.status.shape, run.status.size)} stopped at an event, "
             f"{'at a time of its' if stopped == 1 else 'at times of their'} own; begin a new run "

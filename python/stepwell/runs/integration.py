@@ -38,7 +38,7 @@ HINTS = {
     "save_every": "each so many steps are saved by every=",
     "saveat": "with tolerance= the times of saved states are at=, with fixed steps each every=-th is saved",
     "n_steps": "the number of steps is steps=",
-    "dense_output": "ask for states at more times by at=, or for every step by every=1",
+    "dense_output": "every=1 keeps all steps, and run(t) is the state at any time; at= are times known before",
 }
 
 

@@ -140,6 +140,8 @@ class Run(ValueEquality):
     #: Names of the events that change the state, ``Event(…, then=…)``.
     changed_by: tuple[str, ...] = ()
     findings: tuple[Finding, ...] = ()
+    #: Whether it has the states after all accepted steps.
+    has_each_step: bool = False
     #: Whether its last state is left out; see ``select``.
     is_part: bool = False
 
@@ -234,8 +236,36 @@ class Run(ValueEquality):
         part = copy.copy(self)
         part.t, part.v, part.y = self.t[places], self.v[places], self.y[places]
         part.recorded = {name: values[places] for name, values in self.recorded.items()}
+        part.has_each_step = False
         part.is_part = self.is_part or not len(places) or bool(places[-1] != len(self.t) - 1)
         return part
+
+    def __call__(self, t: Any) -> Any:
+        """The states at times between the saved ones, of a run with a tolerance and ``every=1``.
+
+        Each is computed by a step of the method from the end of the accepted step before it, as states at the times of ``at=``
+        are, so its error is that of a shorter step. All are made by one call of the core. Where an event stopped a member, its
+        states after that are that of the event; where a member stopped by itself, NaN.
+
+        Args:
+            t: times within the run, units of time, of any shape; the same for all members.
+
+        Returns:
+            The coordinates, shape (*t, *block, *batch); of a system with velocities v and y, both of this shape.
+
+        Raises:
+            ArgumentError: if a time is outside the run.
+            UnsupportedError: if the run does not have all of its steps, or an event changed its states.
+            TooLargeError: if the states do not fit in memory.
+
+        Example:
+            >>> run = sw.integrate(sw.Oscillator(), "dop853", v=0.0, y=1.0, tolerance=1e-9, at=10.0, every=1)
+            >>> v, y = run(np.linspace(0.0, 10.0, 1001))
+            >>> y.shape, bool(np.abs(y - np.cos(np.linspace(0.0, 10.0, 1001))).max() < 1e-8)
+            ((1001,), True)
+        """
+        v, y = registry.task("states_of_run")(self, t)
+        return (v, y) if self.system.v_shape != (0,) else y
 
     def _contents(self) -> dict[str, Any]:
         """All attributes but the functions that go through the steps again, which follow from the others."""

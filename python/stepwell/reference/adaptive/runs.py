@@ -64,6 +64,11 @@ class Jumps(NamedTuple):
             return np.searchsorted(self.before, t, side="right")
         return np.count_nonzero(self.before <= t, axis=0)
 
+    def left(self, t: Any) -> Any:
+        """The time from which a step begins that goes on from t: just after a jump for which a step ended there."""
+        passed = self.passed(t)
+        return np.where(passed > 0, np.maximum(t, self._of_each(t, self.after, np.maximum(passed - 1, 0))), t)
+
     def wall(self, t: Any) -> Any:
         """The next time at which a step from t must end, infinite if there is none."""
         return self._of_each(t, self.before, self.passed(t))
