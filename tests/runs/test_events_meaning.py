@@ -498,3 +498,80 @@ def test_what_is_held_meets_known_times(backend: Any) -> None:
     assert (last == 0.0).all()
     for name, count in counts.items():
         np.testing.assert_array_equal(count, run.events[name].count)
+
+
+IN_MODES = [
+    ("rk4", {"dt": 0.03125, "steps": 640}),
+    ("dop853", {"tolerance": 1e-10, "at": [20.0]}),
+    ("merson", {"tolerance": 1e-10, "at": [20.0]}),
+]
+
+
+def assert_times(run: sw.Run, name: str, times: Any) -> None:
+    np.testing.assert_allclose(run.events[name].t, times, rtol=0, atol=2e-7 if run.paces is None else 3e-8)
+
+
+@BACKENDS
+@pytest.mark.parametrize(("method", "steps"), IN_MODES)
+def test_modes_are_numbers_without_a_rate(backend: Any, method: str, steps: dict[str, Any]) -> None:
+    """A block that is pulled at 1/10 and sticks up to 3/10, slides against 1/5: it slides for 3π/2, and sticks for 2.
+
+    A thermostat between 0.8 and 1.2, with −T + 2 while it heats: ln 1.5 each way; whose switch acts 1/4 later: the temperature
+    goes on to 2 − 0.8·e^(−1/4), and 1.2·e^(−1/4) lower. A neuron that waits for 1/2 after a spike: 1/2 + ln 2 for a push of 2.
+    """
+
+    def made(system: Any, y: Any, events: list[sw.Event]) -> sw.Run:
+        return sw.integrate(system(), method, y=y, events=events, backend=backend, **steps)
+
+    slides = sw.system(order=1)(lambda t, y: [y[1], np.where(y[2] > 0.5, 0.1 * t - y[0] - 0.2, 0.0), 0.0])
+    breaks = sw.Event(
+        lambda t, y: np.where(y[2] > 0.5, -1.0, 0.1 * t - y[0] - 0.3), direction=1, then=lambda t, y: [y[0], y[1], 1.0]
+    )
+    sticks = sw.Event(
+        lambda t, y: np.where(y[2] > 0.5, y[1], -1.0), direction=-1, then=lambda t, y: [y[0], 0.0, 0.0], name="sticks"
+    )
+    assert_times(made(slides, np.zeros(3), [breaks, sticks]), "sticks", 3.0 + 1.5 * np.pi + (2.0 + 1.5 * np.pi) * np.arange(2))
+
+    heats = sw.system(order=1)(lambda t, y: [np.where(y[1] > 0.5, 2.0, 0.0) - y[0], 0.0])
+    on = sw.Event(lambda t, y: y[0] - 0.8, direction=-1, then=lambda t, y: [y[0], 1.0], name="on")
+    off = sw.Event(lambda t, y: y[0] - 1.2, direction=1, then=lambda t, y: [y[0], 0.0], name="off")
+    assert_times(made(heats, [0.8, 1.0], [on, off]), "off", np.log(1.5) * np.arange(1, 50, 2))
+
+    heats = sw.system(order=1)(lambda t, y: [np.where(y[1] > 0.5, 2.0, 0.0) - y[0], 0.0, 0.0, 0.0])
+    on = sw.Event(lambda t, y: y[0] - 0.8, direction=-1, then=lambda t, y: [y[0], y[1], t + 0.25, 1.0], name="on")
+    off = sw.Event(lambda t, y: y[0] - 1.2, direction=1, then=lambda t, y: [y[0], y[1], t + 0.25, 0.0], name="off")
+    acts = sw.Event(lambda t, y: t - y[2], direction=1, then=lambda t, y: [y[0], y[3], y[2], y[3]], name="acts")
+    hottest, coldest = 2.0 - 0.8 * np.exp(-0.25), 0.8 * np.exp(-0.25)
+    up, down = np.log((2.0 - coldest) / 0.8), np.log(hottest / 0.8)
+    first = np.log(1.2 / 0.8)
+    each = first + np.arange(13) * (up + down + 0.5)
+    assert_times(made(heats, [0.8, 1.0, 1e3, 1.0], [on, off, acts]), "off", each[each < 20.0])
+
+    fires = sw.system(order=1)(lambda t, y: [np.where(y[1] > 0.5, 0.0, 2.0 - y[0]), 0.0, -y[1]])
+    spike = sw.Event(lambda t, y: y[0] - 1.0, direction=1, then=lambda t, y: [0.0, 1.0, 0.5], name="spike")
+    goes_on = sw.Event(lambda t, y: np.where(y[1] > 0.5, y[2], -1.0), direction=-1, then=lambda t, y: [y[0], 0.0, 0.0])
+    assert_times(made(fires, np.zeros(3), [spike, goes_on]), "spike", np.log(2.0) + (0.5 + np.log(2.0)) * np.arange(17))
+
+
+@BACKENDS
+@pytest.mark.parametrize(("method", "steps"), [("rk4", {"dt": 0.5, "steps": 4}), ("dop853", {"tolerance": 1e-8, "at": [2.0]})])
+def test_conditions_are_events_where_they_change(backend: Any, method: str, steps: dict[str, Any]) -> None:
+    moves = sw.system(order=1, shape=(2,))(lambda t, y: [1.0, 0.1])()
+    conditions: dict[str, tuple[Any, list[float]]] = {
+        "window": (lambda t, y: (y[0] > 0.18) & (y[0] < 0.19), [0.18, 0.19]),
+        "neither": (lambda t, y: ~((y[0] < 0.18) | (y[0] >= 0.19)), [0.18, 0.19]),
+        "either": (lambda t, y: (y[0] < 0.3) | (y[1] >= 0.15), [0.3, 1.5]),
+        "one": (lambda t, y: y[0] > 1.25, [1.25]),
+        "one of two": (lambda t, y: (y[0] > 0.6) ^ (y[1] > 0.12), [0.6, 1.2]),
+        "all": (lambda t, y: np.all(y > 0.1), [1.0]),
+        "known": (lambda t, y: (y[0] > 0.4) & True & ((t < 9.0) | False), [0.4]),
+    }
+    for direction in (0, 1, -1):
+        events = [sw.Event(function, direction=direction, name=name) for name, (function, _) in conditions.items()]
+        run = sw.integrate(moves, method, y=np.zeros(2), events=events, backend=backend, **steps)
+        for name, (_, times) in conditions.items():
+            expected = times if direction == 0 else times[(direction == -1) != (name == "either") :: 2]
+            np.testing.assert_allclose(run.events[name].t, expected, rtol=0, atol=1e-12, err_msg=f"{name} {direction}")
+    for wrong in (lambda t, y: y[0] == 0.3, lambda t, y: (y[0] < 0.3) & (y[1] != 2.0)):
+        with pytest.raises(sw.errors.TraceError, match=r"expected comparisons by <, <=, > and >=, joined by &, \| and ~"):
+            sw.integrate(moves, method, y=np.zeros(2), events=wrong, **steps)

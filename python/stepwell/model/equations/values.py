@@ -56,6 +56,10 @@ def _mask(x: Any) -> Any:
     raise TraceError("expected a comparison such as y > 0, got a number; write y != 0 to compare it with zero")
 
 
+def _truth(x: Any) -> Truth:
+    return x if isinstance(x, Truth) else Truth(_mask(x))
+
+
 def elementwise(name: str, function: Callable[..., Any], *arguments: Any) -> Any:
     """A function of numbers, applied to scalars and arrays element by element, as NumPy broadcasts them."""
     if not any(isinstance(each, (Array, np.ndarray, list, tuple)) and np.ndim(objects(each)) for each in arguments):
@@ -284,7 +288,9 @@ def compared(name: str, a: Any, b: Any) -> Any:
         if not isinstance(each, (Operators, np.ndarray, list, tuple, bool, np.bool_, *_KNOWN)):
             return NotImplemented
     if all(np.ndim(objects(each)) == 0 for each in (a, b)):
-        return Truth(COMPARISONS[name](value_of(objects(a)[()]), value_of(objects(b)[()])))
+        a, b = (Scalar(value_of(objects(each)[()])) for each in (a, b))
+        margin = {"l": lambda: b - a, "g": lambda: a - b}.get(name[0])
+        return Truth(COMPARISONS[name](a.value, b.value), margin)
     return wrapped(np.frompyfunc(lambda a, b: compared(name, a, b), 2, 1)(objects(a), objects(b)))
 
 
@@ -317,9 +323,16 @@ class Scalar(Operators):
 
 
 class Truth(Scalar):
-    """The truth of a comparison. In arithmetic it is 1 or 0, as in NumPy."""
+    """The truth of a comparison. In arithmetic it is 1 or 0, as in NumPy.
 
-    __slots__ = ()
+    ``margin()`` is a number that is above zero where it is true, and below where it is not; None for equalities.
+    """
+
+    __slots__ = ("margin",)
+
+    def __init__(self, value: Any, margin: Callable[[], Any] | None = None) -> None:
+        super().__init__(value)
+        self.margin = margin
 
     def __and__(self, other: Any) -> Any:
         return self._with("&", operator.and_, other)
@@ -333,19 +346,21 @@ class Truth(Scalar):
     __rand__, __ror__, __rxor__ = __and__, __or__, __xor__
 
     def __invert__(self) -> Truth:
-        return Truth(inverted(self.value))
+        margin = self.margin
+        return Truth(inverted(self.value), margin and (lambda: -margin()))
 
     def _with(self, sign: str, function: Callable[[Any, Any], Any], other: Any) -> Any:
         if isinstance(other, Array):
             return NotImplemented
-        other = _mask(other)
-        if isinstance(other, bool):  # a mask of symbols cannot be combined with booleans
-            both = self.value if other else False
-            either = True if other else self.value
-            return Truth(both if sign == "&" else either)
+        mask = _mask(other)
+        if isinstance(mask, bool):  # a mask of symbols cannot be combined with booleans
+            return self if mask == (sign == "&") else Truth(mask)
         if isinstance(self.value, bool):
-            return Truth(other)._with(sign, function, self)
-        return Truth(function(self.value, other))
+            return other._with(sign, function, self)
+        one, two = self.margin, other.margin
+        less = functions.minimum if sign == "&" else functions.maximum
+        margin = None if one is None or two is None else lambda: elementwise(sign, less, one(), two())
+        return Truth(function(self.value, mask), margin)
 
 
 class Array(Operators):
@@ -426,10 +441,10 @@ class Array(Operators):
     __rand__, __ror__, __rxor__ = __and__, __or__, __xor__
 
     def __invert__(self) -> Any:
-        return wrapped(np.frompyfunc(lambda each: ~Truth(_mask(each)), 1, 1)(self.items))
+        return wrapped(np.frompyfunc(lambda each: ~_truth(each), 1, 1)(self.items))
 
     def _truths(self, function: Callable[[Any, Any], Any], other: Any) -> Any:
-        return wrapped(np.frompyfunc(lambda a, b: function(Truth(_mask(a)), b), 2, 1)(self.items, objects(other)))
+        return wrapped(np.frompyfunc(lambda a, b: function(_truth(a), b), 2, 1)(self.items, objects(other)))
 
     def copy(self) -> Array:
         """Itself, for nothing can be written to it."""

@@ -25,7 +25,8 @@ class Event(Immutable, ValueEquality):
 
     Args:
         function: ``g(t, v, y)``, or ``g(t, y)`` for a system without velocities, that returns one number; written for one member,
-            in NumPy style, as your own equations are. Further arguments are parameters of the system, by name.
+            in NumPy style, as your own equations are. Further arguments are parameters of the system, by name. Or a condition by
+            ``<``, ``<=``, ``>``, ``>=``, ``&``, ``|`` and ``~``, for which g is above zero where it is true.
         times: in place of a function, the times at which it occurs, after the start: a number, several, or shape (times, *batch)
             with some for each member, where NaN is no time.
         period: after each of ``times`` it occurs again and again, so much later each time; a number, or one for each member.

@@ -18,7 +18,7 @@ from ...errors import ArgumentError, TraceError, UnsupportedError
 from ...model.equations.namespace import rebound
 from ...model.equations.recognised import Unknown, identity
 from ...model.equations.trace import kind_of, run_function, scalars
-from ...model.equations.values import Scalar, objects
+from ...model.equations.values import Scalar, Truth, objects
 from ...model.systems import System
 from ...reference.marks import recording
 from ...reference.tape.modes import directional
@@ -139,6 +139,10 @@ class Quantity:
         if result.ndim or not isinstance(result[()], (Scalar, int, float)):
             got = f"an array of shape {result.shape}" if result.ndim else kind_of(result[()])
             raise TraceError(f"{name}: expected one number, whose changes of sign are the event, got {got}")
+        if isinstance(truth := result[()], Truth):
+            if truth.margin is None:
+                raise TraceError(f"{name}: expected comparisons by <, <=, > and >=, joined by &, | and ~, got another condition")
+            result = objects(truth.margin())
         value = result[()].value if isinstance(result[()], Scalar) else result[()]
         return value if isinstance(value, _core.Symbol) else tape.number(float(value))
 
