@@ -31,10 +31,13 @@ from .event import Event
 SHORT = 2.0**-26
 
 
+#: The parameters that a function takes, and their shapes for one member.
+Shapes = dict[str, tuple[int, ...]]
+
 #: The operations of quantities, of those that the core watches and of new states, and how many of each are remembered.
-KNOWN: dict[Any, tuple[Evaluated, Evaluated | None, bool]] = {}
+KNOWN: dict[Any, tuple[Shapes, Evaluated, Evaluated | None, bool]] = {}
 WATCHED: dict[Any, engine.Watched] = {}
-NEW_STATES: dict[Any, Evaluated] = {}
+NEW_STATES: dict[Any, tuple[Shapes, Evaluated]] = {}
 MOST_KNOWN = 256
 
 
@@ -45,7 +48,15 @@ def remember(known: dict[Any, Any], key: Any, value: Any) -> None:
     known[key] = value
 
 
-def parameters_of(function: Any, name: str, system: System, values: dict[str, Any]) -> list[str]:
+def _quick_sines(system: System) -> bool:
+    return bool(getattr(getattr(system, "definition", None), "quick_sines", False))
+
+
+def _shapes(values: dict[str, Any]) -> tuple[Any, ...]:
+    return tuple((name, value.shape[:-1]) for name, value in values.items())
+
+
+def parameters_of(function: Any, name: str, system: System, values: dict[str, Any]) -> Shapes:
     """The parameters of the system that a function of a state takes; ``values`` are those of the system by name."""
     state = ("t", "v", "y") if prod(system.v_shape) > 0 else ("t", "y")
     own = list(inspect.signature(function).parameters.values())
@@ -65,7 +76,7 @@ def parameters_of(function: Any, name: str, system: System, values: dict[str, An
                 f"{name}: expected a function {expected} whose further arguments are parameters of "
                 f"{system.kind_name} that do not change with the time, got {each}. Known: {known}."
             )
-    return taken
+    return {each: values[each].shape[:-1] for each in taken}
 
 
 class Quantity:
@@ -82,22 +93,21 @@ class Quantity:
         self._by_core = by_core
         self.event, self.v_shape, self.y_shape = event, system.v_shape, system.y_shape
         self.has_v = prod(system.v_shape) > 0
-        self._parameters = parameters_of(event.function, f"events: {event.name}", system, values)
-        self._quick_sines = bool(getattr(getattr(system, "definition", None), "quick_sines", False))
-        self._shapes = {name: values[name].shape[:-1] for name in self._parameters}
+        self._quick_sines = _quick_sines(system)
         self._n = 1 + self.has_v * prod(self.v_shape) + prod(self.y_shape)
         #: Equal for quantities with the same operations; None if something that the function reads may change unseen.
         self.key: Any = None
         with suppress(Unknown):
             of_function = identity(event.function)
-            self.key = (of_function, self.v_shape, self.y_shape, tuple(self._shapes.items()), self._quick_sines, by_core)
+            self.key = (of_function, self.v_shape, self.y_shape, _shapes(values), self._quick_sines, by_core)
         known = KNOWN.get(self.key)
+        self._shapes = parameters_of(event.function, f"events: {event.name}", system, values) if known is None else known[0]
         if known is None:
-            known = self._trace()
+            known = self._shapes, *self._trace()
             if self.key is not None:
                 remember(KNOWN, self.key, known)
         #: Whether it depends on the time, and on nothing of the state.
-        self._value, self._slope, self.of_time_alone = known
+        _, self._value, self._slope, self.of_time_alone = known
 
     def _trace(self) -> tuple[Evaluated, Evaluated | None, bool]:
         traces = [self._traced() for _ in range(2)]
@@ -154,7 +164,7 @@ class Quantity:
 
     def numbers(self, values: dict[str, Any]) -> list[Array]:
         """The numbers of its parameters, one after the other."""
-        return [each for name in self._parameters for each in _rows(values[name], values[name].shape[:-1])]
+        return [each for name, shape in self._shapes.items() for each in _rows(values[name], shape)]
 
     def with_parameters(self, tape: _core.Tape, places: dict[str, int]) -> _core.Symbol:
         """Record the quantity as the core computes it, with each parameter from its place on."""
@@ -200,18 +210,19 @@ class NewState:
     def __init__(self, event: Event, system: System, values: dict[str, Any], *, by_core: bool) -> None:
         self._name, self._function = f"events: {event.name}: then", event.then
         self._shapes = (system.v_shape, system.y_shape) if prod(system.v_shape) > 0 else (system.y_shape,)
-        self._parameters = parameters_of(event.then, self._name, system, values)
-        shapes = {name: values[name].shape[:-1] for name in self._parameters}
-        quick_sines = bool(getattr(getattr(system, "definition", None), "quick_sines", False))
-        key: Any = None
+        quick_sines, key = _quick_sines(system), None
         with suppress(Unknown):
-            key = (identity(event.then), self._shapes, tuple(shapes.items()), quick_sines, by_core)
+            key = (identity(event.then), self._shapes, _shapes(values), quick_sines, by_core)
+        known = NEW_STATES.get(key)
+        if known is None:
+            shapes = parameters_of(event.then, self._name, system, values)
+            known = shapes, self._traced(shapes, quick_sines, by_core)
+            if key is not None:
+                remember(NEW_STATES, key, known)
         #: The new state of a time and a state.
-        self.evaluated = NEW_STATES.get(key) or self._traced(shapes, quick_sines, by_core)
-        if key is not None:
-            remember(NEW_STATES, key, self.evaluated)
+        self._parameters, self.evaluated = known
 
-    def _traced(self, shapes: dict[str, Any], quick_sines: bool, by_core: bool) -> Evaluated:
+    def _traced(self, shapes: Shapes, quick_sines: bool, by_core: bool) -> Evaluated:
         tape = _core.Tape()
         numbers, state = map(tape.param, count()), map(tape.state, count())
         t = next(state)
@@ -223,7 +234,7 @@ class NewState:
 
     def numbers(self, values: dict[str, Any]) -> list[Array]:
         """The numbers of its parameters, one after the other."""
-        return [each for name in self._parameters for each in _rows(values[name], values[name].shape[:-1])]
+        return [each for name, shape in self._parameters.items() for each in _rows(values[name], shape)]
 
     def _blocks(self, result: Any) -> list[Any]:
         """The blocks that the function returned, broadcast to their shapes."""

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cached_property
 from itertools import count
-from math import prod
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -151,33 +151,53 @@ class Trials:
         What has the same structure has the same operations, which are traced once. A step that the core does not make by one
         tape, as of many bodies, is not traced at all: that would take seconds.
         """
-        plan, tape, key = self._members.plan(np.arange(self._plan.members)), _core.Tape(), None
+        plan, key = self._everyone, None
         if self._by_core:
-            model, choice = engine.model(plan), 0 if self._adaptive else plan.choice
-            if _core.in_parts(model, plan.members, choice=choice, attempts=self._adaptive) is not None:
+            if self._number is None:
                 return None
-            key = (_core.tape_number(model, choice=choice, attempts=self._adaptive), what, plan.choice)
-        # Attempts of fused steps fuse what the rates say; steps of one length are made again without.
-        system = plan.stepped if self._adaptive else plan.system
-        tracer, sizes = Tracer(system, tape, plan.force), [prod(system.v_shape), prod(system.y_shape)]
-        leaves = map(tape.state, count())
+            key = (self._number, what, plan.choice)
+            if key in TRACED:
+                return TRACED[key], self._numbers
+        tracer = self._tracer()
+        leaves = map(tracer.tape.state, count())
         t, h = next(leaves), next(leaves)
-        if key in TRACED:
-            self._scaled_symbols(tracer, h)  # which lists the parameters
-            evaluated = TRACED[key]
-        else:
-            v, y = (_symbols(shape, leaves) for shape in (plan.system.v_shape, plan.system.y_shape))
-            values = tracer.flat(*blocks(tracer, plan, t, h, v, y))
-            if tracer.tables:
-                return None
-            evaluated = Evaluated(tape, values, 2 + sum(sizes), by_core=self._by_core)
-            if not (self._by_core or self._always_traced or evaluated.operations <= MOST_OPERATIONS):
-                return None
-            if key is not None:
-                if len(TRACED) >= MOST_TRACED:
-                    TRACED.clear()
-                TRACED[key] = evaluated
+        v, y = (_symbols(shape, leaves) for shape in (plan.system.v_shape, plan.system.y_shape))
+        values = tracer.flat(*blocks(tracer, plan, t, h, v, y))
+        if tracer.tables:
+            return None
+        evaluated = Evaluated(tracer.tape, values, 2 + v.size + y.size, by_core=self._by_core)
+        if not (self._by_core or self._always_traced or evaluated.operations <= MOST_OPERATIONS):
+            return None
+        if key is not None:
+            if len(TRACED) >= MOST_TRACED:
+                TRACED.clear()
+            TRACED[key] = evaluated
         return evaluated, [np.atleast_1d(each) for each in tracer.numbers]
+
+    @cached_property
+    def _everyone(self) -> engine.Plan:
+        return self._members.plan(np.arange(self._plan.members))
+
+    @cached_property
+    def _number(self) -> int | None:
+        """The number of the tape of a step, the same for all plans with it; None if it is not one tape."""
+        plan = self._everyone
+        model, choice = engine.model(plan), 0 if self._adaptive else plan.choice
+        if _core.in_parts(model, plan.members, choice=choice, attempts=self._adaptive) is not None:
+            return None
+        return _core.tape_number(model, choice=choice, attempts=self._adaptive)
+
+    def _tracer(self) -> Tracer:
+        # Attempts of fused steps fuse what the rates say; steps of one length are made again without.
+        plan = self._everyone
+        return Tracer(plan.stepped if self._adaptive else plan.system, _core.Tape(), plan.force)
+
+    @cached_property
+    def _numbers(self) -> list[Array]:
+        """The values of the parameters of what was traced before."""
+        tracer = self._tracer()
+        self._scaled_symbols(tracer, tracer.tape.state(1))
+        return [np.atleast_1d(each) for each in tracer.numbers]
 
     def _scaled(self, plan: engine.Plan, h: Any) -> Any:
         """The system of these members, scaled to a length for each."""
