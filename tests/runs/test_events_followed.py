@@ -35,6 +35,18 @@ OF_A_PLACE = {
     "noted": lambda: sw.Event(lambda t, v, y: v - 0.1, name="noted"),
     "end": lambda: sw.Event(lambda t, v, y: y - 0.3, terminal=5, name="end"),
 }
+#: Events at known times: listed ones of all or of each member, with and without a change, some that stop; zeros of the time alone.
+KNOWN = {
+    "dose": lambda then, n: sw.Event(times=0.3, period=0.4, then=then, name="dose"),
+    "each": lambda then, n: sw.Event(times=np.linspace(-0.5, 1.1, 2 * n).reshape(2, n), then=then, name="each"),
+    "look": lambda then, n: sw.Event(times=[0.25, 0.1, 1.0, -0.6], name="look"),
+    "last": lambda then, n: sw.Event(times=[0.5, -0.5], period=np.linspace(0.1, 0.9, n), terminal=3, name="last"),
+}
+#: Zeros of the time alone, for a system of first and of second order.
+SINES = (
+    lambda: sw.Event(lambda t, y: np.sin(5.0 * t) - 0.2, direction=1, then=lambda t, y: [y[0], y[1] - 0.3], name="sine"),
+    lambda: sw.Event(lambda t, v, y: np.sin(5.0 * t) - 0.2, direction=-1, then=lambda t, v, y: (v, y + 0.1), name="sine"),
+)
 #: In this run states are changed again and again in no time, for which the reference takes two minutes.
 CHATTERING = (38,)
 NONE = np.zeros((2, 2))
@@ -63,13 +75,21 @@ ADAPTIVE_WAYS: dict[str, dict[str, Any]] = {
 }
 
 
-def drawn(number: int, backend: str, way: str | None = None) -> sw.Run:
-    """A run with one to three of these events, from starts with one decimal place, some of them at an event."""
+def drawn(number: int, backend: str, way: str | None = None, known: bool = False) -> sw.Run:
+    """A run with one to three of these events, from starts with one decimal place, some of them at an event.
+
+    With some at known times among them, if ``known``.
+    """
     random = np.random.default_rng([13, number])
     pool = (OF_COORDINATES, OF_A_PLACE)[number % 2]
     events = [pool[name]() for name in random.choice(list(pool), size=random.integers(1, 4), replace=False)]
     n, dt, every = int(random.choice([1, 3, 9])), float(random.choice([0.01, 0.1, 0.3])), random.choice([None, 1, 5])
     options: Any = {"dt": dt, "steps": int(random.choice([7, 30])), "every": None if every is None else int(every)}
+    if known:
+        thens = (lambda t, y: [y[0] + 0.5, y[1]]), (lambda t, v, y: (v + 0.5, y))
+        more = [SINES[number % 2], *(lambda of=of: of(thens[number % 2], n) for of in KNOWN.values())]
+        for each in np.random.default_rng([14, number]).choice(len(more), size=2, replace=False):
+            events.insert(int(each) % 2, more[each]())
     w = float(random.choice([0.5, 3.0]))
     if number % 2:
         options |= {"v": np.round(random.normal(size=n), 1), "y": np.round(random.normal(size=n), 1) * (random.random() > 0.2)}
@@ -84,12 +104,12 @@ def drawn(number: int, backend: str, way: str | None = None) -> sw.Run:
     return sw.integrate(system, method, events=events, backend=backend, **options)
 
 
-def check_the_core_follows_as_the_reference_does(numbers: range, way: str | None = None) -> None:
+def check_the_core_follows_as_the_reference_does(numbers: range, way: str | None = None, known: bool = False) -> None:
     occurred, rested = 0, 0
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         for number in (each for each in numbers if each not in CHATTERING):
-            run, reference = (drawn(number, backend, way) for backend in ("rust", "numpy"))
+            run, reference = (drawn(number, backend, way, known) for backend in ("rust", "numpy"))
             assert_same_run(run, reference)
             assert [str(each) for each in run.findings] == [str(each) for each in reference.findings], number
             occurred += sum(int(each.count.sum()) for each in run.events.values())
@@ -101,6 +121,13 @@ def check_the_core_follows_as_the_reference_does(numbers: range, way: str | None
 @pytest.mark.parametrize("part", range(4))
 def test_the_core_follows_as_the_reference_does(part: int) -> None:
     check_the_core_follows_as_the_reference_does(range(16 * part, 16 * part + 16))
+
+
+@pytest.mark.parametrize("way", [None, "three times", "many times", "back", "jumps"])
+def test_with_known_times_too(way: str | None) -> None:
+    check_the_core_follows_as_the_reference_does(
+        range(100, 132 if way is None else 110) if way != "jumps" else range(140, 150), way, known=True
+    )
 
 
 @pytest.mark.parametrize("way", ADAPTIVE_WAYS)

@@ -26,9 +26,28 @@ struct ValuesOf<'py> {
     parameters: Vec<PyReadonlyArray1<'py, f64>>,
 }
 
+/// Known times: see `TimesOfCore` there.
+#[derive(FromPyObject)]
+struct TimesOf<'py> {
+    keys: PyReadonlyArray2<'py, f64>,
+    signs: PyReadonlyArray2<'py, f64>,
+}
+
+impl TimesOf<'_> {
+    fn of_core(&self, members: usize) -> PyResult<motion::Times<'_>> {
+        let (keys, signs, columns) = (self.keys.as_slice()?, self.signs.as_slice()?, self.keys.as_array().ncols());
+        let is_ended = keys.rchunks(columns.max(1)).next().is_some_and(|last| last.iter().all(|key| *key == f64::INFINITY));
+        if !is_ended || keys.len() != signs.len() || (columns != 1 && columns != members) {
+            return Err(argument_error(format!("expected rows of one time or {members}, the last infinite, got {columns}")));
+        }
+        Ok(motion::Times { keys, signs, columns })
+    }
+}
+
 /// An event: see `OfCore` there.
 #[derive(FromPyObject)]
 struct EventOf<'py> {
+    times: Option<TimesOf<'py>>,
     quantity: ValuesOf<'py>,
     slope: Option<ValuesOf<'py>>,
     then: Option<ValuesOf<'py>>,
@@ -47,6 +66,7 @@ pub(crate) struct EventsOf<'py> {
     groups: usize,
     begin: PyReadonlyArray1<'py, f64>,
     sign: f64,
+    way: f64,
 }
 
 /// A row of one number for all members, or one for each.
@@ -73,6 +93,7 @@ impl EventsOf<'_> {
             .iter()
             .map(|event| {
                 Ok(motion::Event {
+                    times: event.times.as_ref().map(|times| times.of_core(members)).transpose()?,
                     quantity: event.quantity.of_core(members)?,
                     slope: event.slope.as_ref().map(|slope| slope.of_core(members)).transpose()?,
                     then: event.then.as_ref().map(|then| then.of_core(members)).transpose()?,
@@ -91,6 +112,7 @@ impl EventsOf<'_> {
             groups: self.groups,
             begin: row(&self.begin, members)?,
             sign: self.sign,
+            way: self.way,
             level: Level::choose().map_err(|unknown| core_error(unknown.into()))?,
             found,
         })

@@ -63,23 +63,23 @@ class AdaptiveRun:
         numbers = 3 + prod(plan.system.v_shape) + prod(plan.system.y_shape)
         rows = sum(numbers * min(event.most, int(event.terminal) or pacing.budget) for event in self._events)
         checks.fits("the events", rows, plan.batch, "keep fewer of each by Event(…, most=…) or split the batch")
-        driver = self._begun(plan, pacing)
+        driver = self._begun(plan, pacing, paces)
         looked = driver.sought()
         # A series is not looked at in the lanes, where its coefficients are.
         in_lanes = looked is not None and self._keep is None and not plan.method.has_series and driver.goes_in_lanes()
         out = driver.made(looked, paces, v, y) if in_lanes and looked is not None else None
         if out is None:
-            driver = self._begun(plan, pacing) if in_lanes else driver
+            driver = self._begun(plan, pacing, paces) if in_lanes else driver
             driver.locator = None if looked is None else partial(by_core.located, driver, looked)
             out = driver.run(paces, v, y)
         if plan.progress is not None:
             plan.progress(1.0)
         return out
 
-    def _begun(self, plan: engine.Plan, pacing: engine.Pacing) -> _Driver:
+    def _begun(self, plan: engine.Plan, pacing: engine.Pacing, paces: Array) -> _Driver:
         """A driver that has not found anything."""
         changing = any(event.then for event in self._events)
-        self._driver = (_Resetting if changing else _Driver)(plan, self._events, pacing)
+        self._driver = (_Resetting if changing else _Driver)(plan, self._events, pacing, paces)
         self._driver.keep = self._keep
         return self._driver
 
@@ -100,7 +100,7 @@ class _Driver(Collected):
     #: Makes the run and saves states of its steps; None if steps are not saved.
     keep: Keep | None = None
 
-    def __init__(self, plan: engine.Plan, events: Sequence[Event], pacing: engine.Pacing) -> None:
+    def __init__(self, plan: engine.Plan, events: Sequence[Event], pacing: engine.Pacing, paces: Array) -> None:
         super().__init__(plan, events, AdaptiveTrials)
         #: The time at which each member is at the end.
         self.pacing, self.end = pacing, np.broadcast_to(pacing.at[-1], plan.batch).reshape(-1)
@@ -114,6 +114,11 @@ class _Driver(Collected):
         self.attempts, self.steps = np.zeros(total), np.zeros(total)
         self.begin, self.since = np.broadcast_to(plan.t0, plan.batch).reshape(-1), np.full(total, -np.inf)
         self.reached = np.array(self.begin, dtype=np.float64)
+        if not pacing.begins:
+            rows = np.broadcast_to(paces.reshape(self.numbers, -1), (self.numbers, total))
+            # A held step was searched before, up to the last time of the run that goes on.
+            self.since, self.begin = np.where(rows[engine.HELD] > 0.0, rows[engine.TARGET], -np.inf), rows[engine.TIME]
+        self.cover(self.begin, self.end)
 
     def run(self, paces: Array, v: Array, y: Array) -> engine.Adapted:
         """Find all events, then make the run up to where members stop."""
@@ -151,11 +156,6 @@ class _Driver(Collected):
         system, total = self.plan.system, self.plan.members
         rows = np.broadcast_to(paces.reshape(self.numbers, -1), (self.numbers, total))
         blocks = v.reshape(*system.v_shape, total), y.reshape(*system.y_shape, total)
-        if not self.pacing.begins:
-            # A held step was searched before, up to the last time of the run that goes on.
-            self.since = np.where(rows[engine.HELD] > 0.0, rows[engine.TARGET], -np.inf)
-            self.begin = rows[engine.TIME]
-        self.cover(self.begin, self.end)
         v, y = (block[..., index] for block in blocks)
         self.look(index, rows[:, index], v, y, self.pacing.begins)
 
@@ -284,8 +284,8 @@ class _Driver(Collected):
 class _Resetting(_Driver):
     """A run with events that change the state, part by part: members with a changed state make their next parts together."""
 
-    def __init__(self, plan: engine.Plan, events: Sequence[Event], pacing: engine.Pacing) -> None:
-        super().__init__(plan, events, pacing)
+    def __init__(self, plan: engine.Plan, events: Sequence[Event], pacing: engine.Pacing, paces: Array) -> None:
+        super().__init__(plan, events, pacing, paces)
         self._resets, total = Resets(self), plan.members
         #: The time and the state at the start of each member's part, the length of its last part, the ratio to that before.
         self._start, self._flight, self._ratio = (np.full(total, np.nan) for _ in range(3))

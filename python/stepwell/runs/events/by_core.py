@@ -24,9 +24,23 @@ class Values(NamedTuple):
     parameters: list[Array]
 
 
-class OfCore(NamedTuple):
-    """An event: its quantity, the slope of that, None if it has no derivative, and the new state, None without one, as values."""
+class TimesOfCore(NamedTuple):
+    """Known times of an event, negated if the motion goes back, ascending, the last infinite; signs of its quantity before them.
 
+    Both are of shape (times, members), or (times, 1).
+    """
+
+    keys: Array
+    signs: Array
+
+
+class OfCore(NamedTuple):
+    """An event as values: its quantity, the slope of that, None without a derivative, and the new state, None without one.
+
+    ``times`` are its times, if they are known.
+    """
+
+    times: TimesOfCore | None
     quantity: Values
     slope: Values | None
     then: Values | None
@@ -50,6 +64,7 @@ class Sought(NamedTuple):
         groups: of how many groups of them adaptive steps know the largest size.
         begin: the times of step 0, one for all or one of each member.
         sign: −1 where the time of the run is negated.
+        way: −1 where the time of the run falls.
     """
 
     events: list[OfCore]
@@ -59,6 +74,7 @@ class Sought(NamedTuple):
     groups: int
     begin: Array
     sign: float
+    way: float
 
 
 def sought(search: Collected, new_states: dict[int, NewState] | None = None) -> Sought | None:
@@ -75,23 +91,28 @@ def sought(search: Collected, new_states: dict[int, NewState] | None = None) -> 
         return None
     events = []
     for e, (event, quantity) in enumerate(zip(search.events, search.quantities, strict=True)):
-        if isinstance(quantity, Timed):  # its times are known
-            return None
-        numbers = quantity.numbers(search.members.parameters)
-        value, slope = quantity.evaluated
-        of_slope = None if slope is None else _values(slope, numbers)
-        of_value = _values(value, numbers)
+        of_slope = times = None
+        if isinstance(quantity, Timed):
+            times, of_value = (
+                TimesOfCore(*quantity.rows),
+                _values(Evaluated(tape := _core.Tape(), [tape.number(1.0)], 0, by_core=True), []),
+            )
+        else:
+            numbers = quantity.numbers(search.members.parameters)
+            value, slope = quantity.evaluated
+            of_slope = None if slope is None else _values(slope, numbers)
+            of_value = _values(value, numbers)
         then = (new_states or {}).get(e)
         of_then = None if then is None else _values(then.evaluated, then.numbers(search.members.parameters))
-        if of_value is None or (slope is not None and of_slope is None) or (then is not None and of_then is None):
+        if of_value is None or (then is not None and of_then is None):
             return None
-        events.append(OfCore(of_value, of_slope, of_then, float(event.direction), int(event.terminal), event.most))
+        events.append(OfCore(times, of_value, of_slope, of_then, float(event.direction), int(event.terminal), event.most))
     both = [_values(*each) for each in (step, rates)]
     if both[0] is None or both[1] is None:
         return None
     begin = np.ascontiguousarray(np.broadcast_to(plan.t0, plan.batch).reshape(-1) if np.ndim(plan.t0) else [plan.t0], np.float64)
     n = prod(plan.system.v_shape) + prod(plan.system.y_shape)
-    return Sought(events, both[0], both[1], n, engine.groups_of(plan), begin, search.sign)
+    return Sought(events, both[0], both[1], n, engine.groups_of(plan), begin, search.sign, search.way)
 
 
 def _values(evaluated: Evaluated, numbers: list[Array]) -> Values | None:

@@ -35,6 +35,9 @@ class Timed:
         zeros: for an event that has no listed times.
     """
 
+    #: As a quantity's: its operations are those of any other.
+    key = "of a known time"
+
     def __init__(self, event: Event, system: System, batch: tuple[int, ...], way: float, zeros: Zeros | None = None) -> None:
         self.event, self._way, self._axes, self._zeros = event, way, len(system.y_shape), zeros
         self._listed, self._period = self._of_batch("times", event.times, batch), self._of_batch("period", event.period, batch)
@@ -79,6 +82,11 @@ class Timed:
         order = np.argsort(keys, axis=0, kind="stable")
         last = np.full((1, keys.shape[1]), np.inf)  # behind all others
         self._keys, self._signs = (np.concatenate([np.take_along_axis(each, order, 0), last]) for each in (keys, signs))
+
+    @property
+    def rows(self) -> tuple[Array, Array]:
+        """The times that are known, negated if the motion goes back, ascending, the last infinite; the signs before them."""
+        return self._keys, self._signs
 
     def covers(self, begin: float, end: float) -> bool:
         """Whether all times between these are known."""

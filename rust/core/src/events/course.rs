@@ -5,8 +5,8 @@ use std::sync::Arc;
 
 use super::{
     motion::At,
-    resets::{LARGEST_RATIO, MOST_IN_A_STEP, Memory, NO_TIME, Resting, SETTLED, larger},
-    search::{LEAST_SHARE, Part},
+    resets::{Instant, LARGEST_RATIO, MOST_IN_A_STEP, Memory, NO_TIME, Resting, SETTLED, larger},
+    search::{LEAST_SHARE, Part, sign},
     watch::{Candidate, Candidates, Change, Located, Step, Stop, Watch},
 };
 
@@ -81,7 +81,21 @@ impl Watch<'_> {
         for (e, (located, _)) in found.into_iter().enumerate() {
             located.into_iter().filter(|one| one.share < share).for_each(|one| self.note(e, one));
         }
-        let t = instant.at.t;
+        let mut rested = Vec::new();
+        let mut stop = self.arrive(course, instant, &mut rested);
+        while let Some(instant) = self.wakes_later(course, &mut stop) {
+            stop = self.arrive(course, instant, &mut rested);
+        }
+        if course.memory.rest.is_some() {
+            self.end_member(&course.memory);
+        }
+        stop.rested = rested;
+        Some(stop)
+    }
+
+    /// Takes a member through an instant. Returns where it goes on, or stops; if it is at rest there, its state is noted.
+    fn arrive(&mut self, course: &mut Course, instant: Instant, rested: &mut Vec<(f64, Vec<f64>)>) -> Stop {
+        let (step, t, share) = (Arc::clone(&instant.at.step), instant.at.t, instant.at.share);
         let lies = course.memory.at.clone();
         let after = self.happen(&mut course.memory, step.h, instant, &lies);
         let returned = lies.iter().zip(&after.at).any(|(before, after)| *before != 0.0 && *after != 0.0);
@@ -107,21 +121,16 @@ impl Watch<'_> {
         course.state.clone_from(&state);
         course.memory.at = after.at;
         let limit = if is_settled { t + flight * rest_of_series } else { t };
-        let mut stop = Stop { step, t, state, goes_on: true, since: t };
+        let mut stop = Stop { step, t, state, goes_on: true, rested: Vec::new() };
         if after.stops {
             (stop.t, stop.goes_on) = (limit.min(course.end), false);
-            self.found.stopped_at[member - self.first] = stop.t;
+            self.found.stopped_at[course.memory.member - self.first] = stop.t;
         } else if let (true, Some(event)) = (rests, after.event) {
             (stop.t, stop.goes_on) = (limit.min(course.end), false);
             course.memory.rest = Some(Resting { event, since: stop.t });
-            if let Some(start) = self.let_go_later(course, event, stop.t, stop.step.h) {
-                (stop.t, stop.goes_on, course.start, course.flight) = (start, true, start, f64::NAN);
-                course.memory.rest = None;
-            } else {
-                self.end_member(&course.memory);
-            }
+            rested.push((t, stop.state.clone()));
         }
-        Some(stop)
+        stop
     }
 
     /// The parts of a step in which an event changes its sign, and that at its start if the member returns there in no time.
@@ -156,19 +165,34 @@ impl Watch<'_> {
         there.into_iter().zip(located).filter(|(_, one)| counts(one)).map(|(change, _)| change).collect()
     }
 
-    /// When an event lets a member at rest go, before the end of its run; as far as some times, evenly apart, show.
-    fn let_go_later(&mut self, course: &mut Course, e: usize, begin: f64, h: f64) -> Option<f64> {
+    /// Goes on with a member at rest when the event that holds it lets it go, before the end of its run, as far as some times, evenly
+    /// apart, show. Or returns the instant at which it meets another event, whose time is known, before.
+    fn wakes_later(&mut self, course: &mut Course, stop: &mut Stop) -> Option<Instant> {
         let Course { memory, end, state, .. } = course;
+        let (Resting { event: e, since: begin }, member, h) = (memory.rest?, memory.member, stop.step.h);
         if !memory.led_back[e] {
             return None;
         }
-        let time = |look: u32| begin + (*end - begin) * (f64::from(look) / f64::from(LOOKS));
-        let member = memory.member;
-        let first = (1..=LOOKS).find(|look| !self.holds(memory, e, h, At { member, t: time(*look), state }))?;
-        let last = if first > 1 { time(first - 1) } else { begin };
-        let within = time(first) - last;
-        let share = self.let_go(memory, e, within, h, At { member, t: last, state });
-        (memory.led_back[e], memory.lain[e]) = (false, false);
-        Some(last + share * within)
+        let nexts: Vec<Option<f64>> = (0..self.events()).map(|e| self.motion.events.next(e, member, begin)).collect();
+        let known = nexts.iter().flatten().copied().fold(f64::INFINITY, f64::min);
+        let until = end.min(known);
+        let time = |look: u32| begin + (until - begin) * (f64::from(look) / f64::from(LOOKS));
+        if let Some(first) = (1..=LOOKS).find(|look| !self.holds(memory, e, h, At { member, t: time(*look), state })) {
+            let last = if first > 1 { time(first - 1) } else { begin };
+            let within = time(first) - last;
+            let share = self.let_go(memory, e, within, h, At { member, t: last, state });
+            (memory.led_back[e], memory.lain[e], memory.rest) = (false, false, None);
+            course.start = last + share * within;
+            (stop.t, stop.goes_on, course.flight) = (course.start, true, f64::NAN);
+            return None;
+        }
+        if known > *end {
+            return None;
+        }
+        memory.rest = None;
+        let side = (0..nexts.len()).map(|e| sign(self.motion.g(e, At { member, t: known, state }))).collect();
+        let due = nexts.iter().map(|next| *next == Some(known)).collect();
+        let at = Located { step: Arc::clone(&stop.step), share: 1.0, t: known, state: state.clone() };
+        Some(Instant { at, side, due, size: vec![0.0; nexts.len()] })
     }
 }

@@ -5,6 +5,7 @@ use std::{fmt, sync::Mutex};
 use super::{
     evaluation::{Evaluation, Evaluator, Filled},
     found::Found,
+    watch::may_change,
 };
 use crate::{isa::Level, model::spec::Row};
 
@@ -25,8 +26,47 @@ impl Values<'_> {
     }
 }
 
+/// The times of an event that are known before a run, in the order of the motion, and the signs of its quantity before them.
+pub struct Times<'a> {
+    /// Rows of one time for all members, or one for each: negated if the motion goes back in time, ascending, the last infinite.
+    pub keys: &'a [f64],
+    /// The signs, likewise.
+    pub signs: &'a [f64],
+    /// How many numbers a row has.
+    pub columns: usize,
+}
+
+impl Times<'_> {
+    /// How many times of a member are not after this one, and where they stand.
+    fn place(&self, member: usize, key: f64) -> (usize, impl Fn(usize) -> usize + use<>) {
+        let (columns, column) = (self.columns, if self.columns > 1 { member } else { 0 });
+        let at = move |row: usize| row * columns + column;
+        let (mut low, mut high) = (0, self.keys.len() / columns - 1);
+        while low < high {
+            let middle = (low + high) / 2;
+            (low, high) = if self.keys[at(middle)] <= key { (middle + 1, high) } else { (low, middle) };
+        }
+        (low, at)
+    }
+
+    /// The first time of a member after this one, and the sign before it.
+    pub(super) fn after(&self, member: usize, key: f64) -> [f64; 2] {
+        let (place, at) = self.place(member, key);
+        [self.keys[at(place)], self.signs[at(place)]]
+    }
+
+    /// The time of a member that is nearest to this one.
+    pub(super) fn nearest(&self, member: usize, key: f64) -> f64 {
+        let (place, at) = self.place(member, key);
+        let [later, earlier] = [place, place.saturating_sub(1)].map(|row| self.keys[at(row)]);
+        if later - key < (key - earlier).abs() { later } else { earlier }
+    }
+}
+
 /// An event.
 pub struct Event<'a> {
+    /// Its times, if they are known: its quantity then never changes its sign.
+    pub times: Option<Times<'a>>,
     /// Its quantity, of a time and a state.
     pub quantity: Values<'a>,
     /// The rate of change of that, of a time, a state and the rates of change of these; none if it has no derivative.
@@ -57,6 +97,8 @@ pub struct Events<'a> {
     pub begin: Row<'a>,
     /// −1 where the time of the run is that of the events, negated.
     pub sign: f64,
+    /// −1 where the time of the run falls.
+    pub way: f64,
     /// What hot loops may use.
     pub level: Level,
     /// What was found so far.
@@ -66,6 +108,23 @@ pub struct Events<'a> {
 impl fmt::Debug for Events<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("Events").field("number", &self.events.len()).finish_non_exhaustive()
+    }
+}
+
+impl Events<'_> {
+    /// The first time of an event after this one, infinite or none where it is not known, in the order of the motion.
+    pub(crate) fn next(&self, e: usize, member: usize, t: f64) -> Option<f64> {
+        Some(self.events[e].times.as_ref()?.after(member, self.way * t)[0])
+    }
+
+    /// Whether an event may occur in a step between these times, by its times or by its quantity one step before and at both ends.
+    pub(crate) fn may_occur(&self, e: usize, member: usize, [before, g, g_end]: [f64; 3], [t, t_end]: [f64; 2]) -> bool {
+        self.next(e, member, t).map_or_else(|| may_change(before, g, g_end), |next| next <= self.way * t_end)
+    }
+
+    /// Whether an event occurs between these times, as is known before.
+    pub(crate) fn comes(&self, member: usize, t: f64, t_end: f64) -> bool {
+        (0..self.events.len()).any(|e| self.next(e, member, t).is_some_and(|next| next <= self.way * t_end))
     }
 }
 

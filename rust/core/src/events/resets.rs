@@ -7,7 +7,7 @@ use super::{
     found::Rest,
     motion::{At, Events, States},
     search::{LEAST_SHARE, Part, located_alone, sign},
-    watch::{Candidate, Change, Located, Side, Step, Stop, Watch, may_change},
+    watch::{Candidate, Change, Located, Side, Step, Stop, Watch},
 };
 
 /// See `runs/events/resets.py` for these.
@@ -246,10 +246,10 @@ impl Watch<'_> {
         let here = At { member: at.step.member, t: at.t, state: &at.state };
         for (e, (occurs, changes)) in found.iter().enumerate() {
             side.push(sign(self.motion.g(e, here)));
-            let mut around = occurs.iter().zip(changes).filter(|(one, of)| of.part.low <= at.share && at.share <= one.share);
+            let mut around = occurs.iter().zip(changes).filter(|(one, of)| self.is_around(e, &at, one, of.part.low));
             if let Some((one, of)) = around.next() {
                 let came = sign(of.part.g_low);
-                due[e] = one.share == at.share || came * side[e] <= 0.0;
+                due[e] = one.share == at.share || came * side[e] <= 0.0 || self.is_timed(e);
                 side[e] = came;
             }
         }
@@ -267,8 +267,9 @@ impl Watch<'_> {
         let counts = |e: usize| !due[e] && (g[e] == 0.0 || held[e] != 0.0);
         let lies: Vec<Side> = (0..events).map(|e| if counts(e) { lies[e] } else { 0.0 }).collect();
         side.iter_mut().zip(&lies).filter(|(_, lies)| **lies != 0.0).for_each(|(side, lies)| *side = *lies);
-        let near: Vec<f64> =
-            (0..events).map(|e| larger(if due[e] { AT * g[e].abs() } else { 0.0 }, LEAST_LEFT * size[e])).collect();
+        let near = |e: usize| larger(if due[e] { AT * g[e].abs() } else { 0.0 }, LEAST_LEFT * size[e]);
+        // Members are at no event that comes by the time.
+        let near: Vec<f64> = (0..events).map(|e| if self.is_timed(e) { -1.0 } else { near(e) }).collect();
         for _ in 0..MOST_AT_ONCE {
             if due.contains(&true) {
                 acted.fill(false);
@@ -375,6 +376,10 @@ impl Watch<'_> {
             }
             found.push((occurs, changes));
         }
+        let wakes = self.wakes_in(memory, stretch, at, h, returns, &mut found);
+        if let Some(first) = wakes {
+            (share, returns) = (first, None);
+        }
         if returns.is_some() {
             share = f64::NEG_INFINITY; // nothing happens before
         }
@@ -382,7 +387,10 @@ impl Watch<'_> {
         for (e, (occurs, _)) in found.iter().enumerate() {
             for one in occurs {
                 if one.share == share {
-                    (here.t, here.state) = (one.t, one.state.clone());
+                    here.t = one.t;
+                    if wakes.is_none() {
+                        here.state.clone_from(&one.state);
+                    }
                 } else if one.share < share {
                     self.note(e, one.clone());
                 }
@@ -393,6 +401,30 @@ impl Watch<'_> {
         let after = self.happen(memory, h, instant, at);
         let share = if returns.is_some() { f64::INFINITY } else { share };
         Ahead { share, t, after, g_end: g_ends, returns }
+    }
+
+    /// The share of a step at which a member that an event holds meets another at a known time; nothing else happens to it before.
+    fn wakes_in(
+        &mut self,
+        memory: &mut Memory,
+        stretch: &Step,
+        at: &[Side],
+        h: f64,
+        returns: Option<usize>,
+        found: &mut [(Vec<Located>, Vec<Change>)],
+    ) -> Option<f64> {
+        let held = returns.filter(|e| memory.led_back[*e])?;
+        let timed = found.iter().enumerate().filter(|(e, _)| self.is_timed(*e)).filter_map(|(_, (occurs, _))| occurs.first());
+        let (first, when) = timed.map(|one| (one.share, one.t)).min_by(|a, b| a.0.total_cmp(&b.0))?;
+        memory.at.copy_from_slice(at);
+        let start = At { member: memory.member, t: stretch.t, state: &stretch.start };
+        if self.let_go(memory, held, when - stretch.t, h, start) < f64::INFINITY {
+            return None;
+        }
+        for (_, of_event) in found.iter_mut().enumerate().filter(|(e, _)| !self.is_timed(*e)) {
+            *of_event = Default::default();
+        }
+        Some(first)
     }
 
     /// Makes one step of a member again, with its events.
@@ -480,7 +512,7 @@ impl Watch<'_> {
 
     /// Makes steps of members, from one number to another, with all that events do to them.
     pub(crate) fn follow(&mut self, followed: &mut [Followed], from: i64, until: i64, h: f64) {
-        let (n, events) = (self.motion.events.numbers, self.events());
+        let (n, events, of_run) = (self.motion.events.numbers, self.events(), self.motion.events);
         let (mut moving, mut made) = (Vec::new(), Made::default());
         for number in from..until {
             moving.clear();
@@ -500,11 +532,12 @@ impl Watch<'_> {
                     continue;
                 }
                 let memory = &mut *each.memory;
-                let may = |e: usize| may_change(memory.before[e], memory.now[e], next[e]);
+                let member = memory.member;
+                let [t, t_end] = [number, number + 1].map(|number| of_run.begin.at(member) + number as f64 * h);
+                let may = |e: usize| of_run.may_occur(e, member, [memory.before[e], memory.now[e], next[e]], [t, t_end]);
                 if memory.is_fresh() || (0..events).any(may) {
                     let start = std::mem::replace(&mut each.state, end.to_vec());
-                    let (member, t) = (memory.member, self.time(memory.member, number, h));
-                    let whole = Step { member, number, t, h, start, end: end.to_vec(), window: None };
+                    let whole = Step { member, number, t, h, t_end, start, end: end.to_vec(), window: None };
                     self.look(each, whole, next);
                     continue;
                 }
@@ -551,7 +584,8 @@ impl Watch<'_> {
         let Some(rest) = each.memory.rest else { return true };
         let member = each.memory.member;
         let [t, t_end] = [number, number + 1].map(|number| self.time(member, number, h));
-        if self.holds(each.memory, rest.event, h, At { member, t: t_end, state: &each.state }) {
+        let comes = each.memory.led_back[rest.event] && self.motion.events.comes(member, t_end - h, t_end);
+        if self.holds(each.memory, rest.event, h, At { member, t: t_end, state: &each.state }) && !comes {
             return false;
         }
         each.memory.rest = None;
@@ -578,7 +612,7 @@ impl Watch<'_> {
         let mut changes: Vec<(usize, Vec<Change>)> = Vec::new();
         for (e, next) in next.iter().copied().enumerate() {
             let g = memory.now[e];
-            if is_at_event || !may_change(memory.before[e], g, next) {
+            if is_at_event || !self.motion.events.may_occur(e, member, [memory.before[e], g, next], [step.t, step.t_end]) {
                 continue;
             }
             let lies = memory.lain[e] && g == 0.0;

@@ -4,7 +4,7 @@ use std::sync::{Arc, PoisonError};
 
 use super::{
     found::Found,
-    motion::{At, Events, Motion, States},
+    motion::{At, Event, Events, Motion, States},
     search::{LEAST_SHARE, Looks, Part, located, located_alone, parted, sign},
 };
 use crate::step::watch::REACH;
@@ -20,6 +20,8 @@ pub(crate) struct Step {
     pub number: i64,
     pub t: f64,
     pub h: f64,
+    /// The time at its end, or at that of the whole step of which it is a part.
+    pub t_end: f64,
     pub start: Vec<f64>,
     pub end: Vec<f64>,
     /// After and until which times events count, if not in all of it.
@@ -53,9 +55,9 @@ pub(crate) struct Noticed {
 }
 
 impl Noticed {
-    /// The time at the start of the step.
-    fn time(&self) -> f64 {
-        self.begin + self.number as f64 * self.h
+    /// The time at the start of the step, or of one after it.
+    fn time(&self, later: i64) -> f64 {
+        self.begin + (self.number + later) as f64 * self.h
     }
 }
 
@@ -86,15 +88,16 @@ pub(crate) struct Stop {
     pub step: Arc<Step>,
     pub t: f64,
     pub state: Vec<f64>,
-    /// Whether it goes on from there, and since when it has had this state.
+    /// Whether it goes on from there.
     pub goes_on: bool,
-    pub since: f64,
+    /// The states in which it was at rest before, and since when.
+    pub rested: Vec<(f64, Vec<f64>)>,
 }
 
 impl Stop {
     /// Where it ends.
     pub(super) fn at(step: Arc<Step>, t: f64, state: Vec<f64>) -> Stop {
-        Stop { step, t, state, goes_on: false, since: t }
+        Stop { step, t, state, goes_on: false, rested: Vec::new() }
     }
 }
 
@@ -198,7 +201,7 @@ impl<'a> Watch<'a> {
     fn made_again(&mut self, mut noticed: Vec<Noticed>) -> Vec<Candidates> {
         let (n, events) = (self.motion.events.numbers, self.motion.events.events.len());
         let (mut candidates, mut starts) = (Vec::new(), States::default());
-        noticed.iter().for_each(|each| starts.push(each.member, each.time(), &each.start));
+        noticed.iter().for_each(|each| starts.push(each.member, each.time(0), &each.start));
         // Each quantity one step before, at the start and at the end of steps: by event.
         let mut before: Vec<Vec<f64>> = (0..events).map(|e| noticed.iter().map(|each| each.before[e]).collect()).collect();
         let mut now: Vec<Vec<f64>> = (0..events).map(|e| self.motion.quantity(e, &starts)).collect();
@@ -207,16 +210,19 @@ impl<'a> Watch<'a> {
             let mut ends = self.motion.steps(&starts, &lengths);
             let next: Vec<Vec<f64>> = (0..events).map(|e| self.motion.quantity(e, &ends)).collect();
             for (i, each) in noticed.iter_mut().enumerate() {
-                if (0..events).any(|e| may_change(before[e][i], now[e][i], next[e][i])) {
+                let times = [starts.t[i], each.time(1)];
+                let of_run = self.motion.events;
+                let may = |e: usize| of_run.may_occur(e, each.member, [before[e][i], now[e][i], next[e][i]], times);
+                if (0..events).any(may) {
                     let [start, end] = [&starts, &ends].map(|states| states.numbers[i * n..(i + 1) * n].to_vec());
-                    let of_events = (0..events).filter(|e| may_change(before[*e][i], now[*e][i], next[*e][i]));
-                    let events = of_events.map(|e| (e, [now[e][i], next[e][i]])).collect();
+                    let events = (0..events).filter(|e| may(*e)).map(|e| (e, [now[e][i], next[e][i]])).collect();
                     if start.iter().chain(&end).all(|x| x.is_finite()) {
                         let step = Step {
                             member: each.member,
                             number: each.number,
                             t: starts.t[i],
                             h: each.h,
+                            t_end: times[1],
                             start,
                             end,
                             window: None,
@@ -225,7 +231,7 @@ impl<'a> Watch<'a> {
                     }
                 }
                 each.number += 1;
-                ends.t[i] = each.time();
+                ends.t[i] = each.time(0);
             }
             (before, now, starts) = (now, next, ends);
             if noticed.iter().any(|each| each.number >= each.until) {
@@ -262,6 +268,9 @@ impl<'a> Watch<'a> {
         candidates: Vec<Candidate>,
         side: impl Fn(usize) -> Side,
     ) -> (Vec<Change>, Vec<usize>) {
+        if self.motion.events.events[e].times.is_some() {
+            return (candidates.into_iter().flat_map(|candidate| self.at_times(e, candidate.step)).collect(), Vec::new());
+        }
         if candidates.is_empty() {
             return Default::default();
         }
@@ -300,8 +309,42 @@ impl<'a> Watch<'a> {
         (parts.into_iter().filter(counts).map(change).collect(), stuck.into_iter().filter(|of| side(*of) != 0.0).collect())
     }
 
+    /// The known times of an event in a step, as parts without a length.
+    fn at_times(&mut self, e: usize, step: Arc<Step>) -> Vec<Change> {
+        let Events { events, way, .. } = self.motion.events;
+        let Event { times: Some(times), direction, .. } = &events[e] else { return Vec::new() };
+        let (mut changes, mut key) = (Vec::new(), way * step.t);
+        loop {
+            let [next, g_low] = times.after(step.member, key);
+            if next > way * step.t_end || next == f64::INFINITY {
+                return changes;
+            }
+            key = next;
+            if g_low * direction > 0.0 {
+                continue;
+            }
+            let (t, start) = (way * key, At { member: step.member, t: step.t, state: &step.start });
+            let (share, state) = if t == step.t_end {
+                (1.0, step.end.clone())
+            } else {
+                ((t - step.t) / step.h, self.motion.step(start, t - step.t).to_vec())
+            };
+            let part = Part { of: 0, low: share, high: share, g_low, g_high: -g_low, slope_low: 0.0, slope_high: 0.0, state };
+            changes.push(Change { step: Arc::clone(&step), part });
+        }
+    }
+
     /// Locates changes of sign.
     pub(super) fn located(&mut self, e: usize, changes: Vec<Change>) -> Vec<Located> {
+        if let Some(times) = &self.motion.events.events[e].times {
+            let way = self.motion.events.way;
+            let at = |Change { step, part }| {
+                let step: Arc<Step> = step;
+                let t = way * times.nearest(step.member, way * (step.t + part.high * step.h));
+                Located { step, share: part.high, t, state: part.state }
+            };
+            return changes.into_iter().map(at).collect();
+        }
         let (steps, mut parts): (Vec<_>, Vec<_>) = changes.into_iter().map(|change| (change.step, change.part)).unzip();
         let motion = &mut self.motion;
         let shares = if let ([step], [part]) = (&steps[..], &mut parts[..]) {
@@ -385,9 +428,10 @@ impl<'a> Watch<'a> {
             let now = self.motion.quantity(e, &at);
             for (end, g) in ends.iter().zip(now) {
                 let mine = each.iter().zip(&of_parts[e]).filter(|(one, _)| one.step.member == end.step.member);
-                let mut around = mine.filter(|(one, [low, _])| *low <= end.share && end.share <= one.share);
+                let mut around = mine.filter(|(one, [low, _])| self.is_around(e, end, one, *low));
                 // The first part around the instant says from which side it came.
-                let due = around.next().is_some_and(|(one, [_, came])| one.share == end.share || sign(*came) * sign(g) <= 0.0);
+                let occurs = |one: &Located, came: f64| one.share == end.share || came * sign(g) <= 0.0 || self.is_timed(e);
+                let due = around.next().is_some_and(|(one, [_, came])| occurs(one, sign(*came)));
                 for one in each.iter().filter(|one| one.step.member == end.step.member && one.share < end.share) {
                     self.note(e, one.clone()); // later ones are not in the run
                 }
@@ -400,6 +444,17 @@ impl<'a> Watch<'a> {
             self.found.stopped_at[end.step.member - self.first] = end.t;
         }
         ends.into_iter().map(|Located { step, t, state, .. }| Stop::at(step, t, state)).collect()
+    }
+
+    /// Whether the times of an event are known.
+    pub(super) fn is_timed(&self, e: usize) -> bool {
+        self.motion.events.events[e].times.is_some()
+    }
+
+    /// Whether an instant is in a part that begins at `low` and ends where its event is located.
+    pub(super) fn is_around(&self, e: usize, at: &Located, one: &Located, low: f64) -> bool {
+        let way = self.motion.events.way;
+        (if self.is_timed(e) { one.t * way <= at.t * way } else { low <= at.share }) && at.share <= one.share
     }
 
     /// Counts one, and keeps it if it is among the first.
@@ -469,7 +524,8 @@ pub fn locate(events: &Events, e: usize, brackets: &Brackets) -> (Vec<f64>, Vec<
         let (start, end) = states.split_at(n);
         let (t, h, [low, high, g_low, g_high]) = (numbers[0], numbers[1], [2, 3, 4, 5].map(|i| numbers[i]));
         let (slope_low, slope_high, state) = (0.0, 0.0, end.to_vec());
-        let step = Step { member: *member as usize, number: 0, t, h, start: start.to_vec(), end: Vec::new(), window: None };
+        let (member, t_end, start) = (*member as usize, t + h, start.to_vec());
+        let step = Step { member, number: 0, t, h, t_end, start, end: Vec::new(), window: None };
         Change { step: Arc::new(step), part: Part { of: 0, low, high, g_low, g_high, slope_low, slope_high, state } }
     });
     let located = Watch::new(events).located(e, changes.collect());

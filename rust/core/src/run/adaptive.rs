@@ -190,6 +190,11 @@ impl<'a> Worker<'a> {
                 self.group.find_running(self.plan.budget as f64, &mut runs);
             }
             if self.looks.is_some() {
+                for (lane, assigned) in assignments.iter().enumerate().filter(|_| !self.plan.jumps.is_empty()) {
+                    if let Some(assigned) = assigned.as_ref().filter(|assigned| assigned.origin.is_none()) {
+                        self.cross(lane, part.first + assigned.member); // behind which a step with events ends
+                    }
+                }
                 self.look(&part, &mut assignments);
                 let stops = assignments.iter().map(|assigned| assigned.as_ref().is_some_and(|assigned| assigned.stop.is_some()));
                 runs.iter_mut().zip(stops).for_each(|(runs, stops)| *runs &= !stops);
@@ -338,14 +343,19 @@ impl<'a> Worker<'a> {
         if pace.t < pace.wall {
             return false;
         }
-        let (before, after) = self.plan.jumps.split_at(self.plan.jumps.len() / 2);
-        let passed = before.partition_point(|row| row.at(member) <= pace.t);
-        let Some(after) = passed.checked_sub(1).and_then(|last| after.get(last)) else { return false };
+        let Some(after) = self.behind(member, pace.t) else { return false };
+        let before = &self.plan.jumps[..self.plan.jumps.len() / 2];
         let wall =
             |t: f64| before.get(before.partition_point(|row| row.at(member) <= t)).map_or(f64::INFINITY, |row| row.at(member));
-        let after = after.at(member);
         self.group.set_pace(lane, pace.crossed(after, wall(after), self.group.has_terms()));
         true
+    }
+
+    /// The time just after the last jump of a member before which a step may have ended; none without one.
+    fn behind(&self, member: usize, t: f64) -> Option<f64> {
+        let (before, after) = self.plan.jumps.split_at(self.plan.jumps.len() / 2);
+        let last = before.partition_point(|row| row.at(member) <= t).checked_sub(1)?;
+        after.get(last).map(|row| row.at(member))
     }
 
     /// How many attempts are made before the next check, by the number of steps that are left to the next saved times. A single
@@ -586,19 +596,24 @@ impl<'a> Worker<'a> {
 
     /// Where a member stops in the step that it holds at its end.
     fn stop_in_held(&mut self, part: &Part, lane: usize, assigned: &Assignment, pace: &Pace<f64>) -> Option<EventStop> {
-        let (looks, last) = (self.looks.as_mut()?, self.plan.at.last()?);
         let member = part.first + assigned.member;
-        let ends = assigned.next == self.plan.at.len() && pace.held > 0.0;
-        if ends { looks.held(&*self.group, lane, member, pace, last.at(member)) } else { None }
+        if assigned.next < self.plan.at.len() || pace.held <= 0.0 {
+            return None;
+        }
+        let t_end = pace.wall.min(pace.t + pace.h);
+        let t_end = if t_end < pace.wall { t_end } else { self.behind(member, t_end).unwrap_or(t_end) };
+        let (looks, last) = (self.looks.as_mut()?, self.plan.at.last()?);
+        looks.held(&*self.group, lane, member, pace, [t_end, last.at(member)])
     }
 
     /// Ends a member where an event stopped it: in that state, also at all later times. Or it goes on from there, as a run begins.
     fn end_at(&mut self, part: &mut Part, lane: usize, assigned: &mut Assignment, stop: &EventStop) {
         let (member, times) = (part.first + assigned.member, self.plan.at.len());
-        for (i, at) in self.plan.at.iter().enumerate() {
-            if at.at(member) >= stop.since {
+        let all = stop.rested.iter().map(|(since, state)| (*since, state)).chain([(stop.t, &stop.state)]);
+        for (since, state) in all {
+            for (i, _) in self.plan.at.iter().enumerate().filter(|(_, at)| at.at(member) >= since) {
                 assigned.next = i;
-                self.write(part, assigned, &stop.state);
+                self.write(part, assigned, state);
             }
         }
         let accepted = (stop.step.number + 1) as f64;

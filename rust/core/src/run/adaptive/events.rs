@@ -8,7 +8,7 @@ use crate::{
         evaluation::Filled,
         motion::{Event, Events, States, Values, finite},
         search::bends,
-        watch::{Candidates, Step, Stop, Watch, may_change},
+        watch::{Candidates, Step, Stop, Watch},
     },
     group::AdaptiveBatch,
     step::pace::Pace,
@@ -221,7 +221,8 @@ impl<'a> Looks<'a> {
                 let (before, g, next) = (quantity.before[lane], quantity.now[lane], quantity.value.values[lane]);
                 let slopes = [quantity.slopes_before[lane] * stretched, quantity.slopes[lane]];
                 let is_special = self.courses[lane].as_ref().is_some_and(|course| course.is_special(e, self.t[lane]));
-                if may_change(before, g, next) || bends([g, next], slopes) || is_special {
+                let times = [self.t[lane], row(places.t)[lane]];
+                if self.events.may_occur(e, member, [before, g, next], times) || bends([g, next], slopes) || is_special {
                     events.push((e, [g, next]));
                 }
                 (quantity.before[lane], quantity.now[lane]) = (g, next);
@@ -233,7 +234,8 @@ impl<'a> Looks<'a> {
             let state = (0..n).map(|i| row(i as f64)[lane]).collect();
             let window = self.window(lane, row(places.t)[lane], end(member));
             let number = self.accepted[lane] as i64;
-            let step = Step { member, number, t: self.t[lane], h: self.h[lane], start, end: state, window };
+            let (t, t_end) = (self.t[lane], row(places.t)[lane]);
+            let step = Step { member, number, t, h: self.h[lane], t_end, start, end: state, window };
             candidates.push((lane, Candidates { step: Arc::new(step), events }));
         }
         self.made = made;
@@ -261,27 +263,28 @@ impl<'a> Looks<'a> {
         self.watch.take(candidates).into_iter().map(|stop| (lane_of(stop.step.member), stop)).collect()
     }
 
-    /// Looks for events in a step that a lane holds, which is in the run only in part.
+    /// Looks for events in a step that a lane holds, which ends at `t_end` and is in the run only to its end.
     pub(super) fn held(
         &mut self,
         group: &dyn AdaptiveBatch,
         lane: usize,
         member: usize,
         pace: &Pace<f64>,
-        end: f64,
+        [t_end, end]: [f64; 2],
     ) -> Option<Stop> {
         let (start, h) = (group.state(lane), length(pace.t, pace.h, pace.wall));
         let mut from = States::default();
         from.push(member, pace.t, &start);
         let motion = &mut self.watch.motion;
-        let there = motion.steps(&from, &[h]);
+        let there = States { t: vec![t_end], ..motion.steps(&from, &[h]) };
         let mut events = Vec::new();
         for (e, quantity) in self.quantities.iter().enumerate() {
             let [g, next] = [&from, &there].map(|at| motion.quantity(e, at)[0]);
             let slopes = [&from, &there].map(|at| motion.slopes(e, at, &[h])[0]);
             let before = if self.fresh[lane] { f64::NAN } else { quantity.before[lane] };
             let is_special = self.courses[lane].as_ref().is_some_and(|course| course.is_special(e, pace.t));
-            if may_change(before, g, next) || bends([g, next], slopes) || is_special {
+            let times = [pace.t, t_end];
+            if self.events.may_occur(e, member, [before, g, next], times) || bends([g, next], slopes) || is_special {
                 events.push((e, [g, next]));
             }
         }
@@ -290,7 +293,7 @@ impl<'a> Looks<'a> {
         }
         let window = Some([self.since[lane], end]);
         let number = pace.accepted as i64;
-        let step = Step { member, number, t: pace.t, h, start, end: there.numbers, window };
+        let step = Step { member, number, t: pace.t, h, t_end, start, end: there.numbers, window };
         self.take(vec![(lane, Candidates { step: Arc::new(step), events })]).pop().map(|(_, stop)| stop)
     }
 }

@@ -5,9 +5,9 @@ use std::sync::Arc;
 use crate::{
     events::{
         evaluation::Filled,
-        motion::Event,
+        motion::{Event, Events},
         resets::{Followed, Memory},
-        watch::{Candidates, Noticed, Step, Stop, Watch, may_change},
+        watch::{Candidates, Noticed, Step, Stop, Watch},
     },
     group::Group,
     model::spec::Spec,
@@ -75,6 +75,12 @@ impl<'w, 'a, T> Looks<'w, 'a, T> {
             memories,
         }
     }
+}
+
+/// Whether an event occurs at a known time within so many steps of a member, from the k-th on.
+fn comes(events: &Events, member: usize, (k, n, h): (i64, i64, f64)) -> bool {
+    let [t, t_end] = [k, k + n].map(|number| events.begin.at(member) + number as f64 * h);
+    events.comes(member, t, t_end)
 }
 
 /// A step of a lane in which an event may occur: its number among those that were made together, and the quantity at both ends.
@@ -199,8 +205,9 @@ impl<T: Real> Looks<'_, '_, T> {
             let may =
                 |lane: usize| !self.notices || on.group.tally()[first_row + rows + lane] != T::default() || !is_finite(lane);
             let is_followed = |lane: &usize| {
-                let is_bad = self.notices && on.first_bad[*lane] >= 0;
-                self.stops[*lane].is_none() && !is_bad && (self.memories[*lane].is_special() || may(*lane))
+                let (is_bad, memory) = (self.notices && on.first_bad[*lane] >= 0, &self.memories[*lane]);
+                let is_due = || may(*lane) || comes(self.watch.motion.events, memory.member, (k, n, h));
+                self.stops[*lane].is_none() && !is_bad && (memory.is_special() || is_due())
             };
             let places: Vec<usize> = (0..on.count).filter(is_followed).collect();
             self.choose_together(places.len() * n as usize, on);
@@ -272,16 +279,13 @@ impl<T: Real> Looks<'_, '_, T> {
         self.states.extend_from_slice(v);
         self.states.extend_from_slice(y);
         on.group.advance(k, n);
-        let may = &on.group.tally()[first_row + rows..][..on.count];
-        let flagged = may.iter().filter(|may| **may != T::default()).count();
-        self.choose_together(flagged * n as usize, on);
-        if flagged == 0 {
-            return;
-        }
-        let may = &on.group.tally()[first_row + rows..][..on.count];
         let (first, h, events) = (on.first, on.h, self.watch.motion.events);
+        let may = &on.group.tally()[first_row + rows..];
+        let is_flagged = |lane: &usize| may[*lane] != T::default() || comes(events, first + lane, (k, n, h));
+        let flagged: Vec<usize> = (0..on.count).filter(is_flagged).collect();
+        self.choose_together(flagged.len() * n as usize, on);
         let mut noticed = Vec::new();
-        for lane in (0..on.count).filter(|lane| may[*lane] != T::default()) {
+        for lane in flagged {
             if self.stops[lane].is_some() || on.first_bad[lane] >= 0 {
                 continue;
             }
@@ -351,7 +355,7 @@ impl<T: Real> Looks<'_, '_, T> {
         let (first, h, events) = (on.first, on.h, self.watch.motion.events);
         let mut seen = Vec::new();
         for row in 0..=steps {
-            let since = (k + row as i64) as f64 * h;
+            let [before_it, since] = [row as i64 - 1, row as i64].map(|row| (k + row) as f64 * h);
             for (event, tile) in self.tiles.iter_mut().enumerate() {
                 if row == 0 && self.begun {
                     continue;
@@ -366,8 +370,12 @@ impl<T: Real> Looks<'_, '_, T> {
                 tile.run();
                 let (now, before) = (&mut self.now[event], &mut self.before[event]);
                 let g = &tile.values[..lanes];
-                if row > 0 && (0..lanes).fold(false, |any, lane| any | may_change(before[lane], now[lane], g[lane])) {
-                    let may = |lane: &usize| may_change(before[*lane], now[*lane], g[*lane]);
+                let may = |lane: &usize| {
+                    let (member, quantities) = (first + lane.min(&(on.count - 1)), [before[*lane], now[*lane], g[*lane]]);
+                    let begin = events.begin.at(member);
+                    events.may_occur(event, member, quantities, [begin + before_it, begin + since])
+                };
+                if row > 0 && (0..lanes).fold(false, |any, lane| any | may(&lane)) {
                     let flagged = (0..on.count).filter(may);
                     seen.extend(flagged.map(|lane| Seen { lane, row: row - 1, event, g: [now[lane], g[lane]] }));
                 }
@@ -394,7 +402,8 @@ impl<T: Real> Looks<'_, '_, T> {
                 continue;
             }
             let (member, number) = (first + lane, k + row as i64);
-            let step = Step { member, number, t: events.begin.at(member) + number as f64 * h, h, start, end, window: None };
+            let [t, t_end] = [number, number + 1].map(|number| events.begin.at(member) + number as f64 * h);
+            let step = Step { member, number, t, h, t_end, start, end, window: None };
             let events = each.iter().map(|seen| (seen.event, seen.g)).collect();
             candidates.push(Candidates { step: Arc::new(step), events });
         }
