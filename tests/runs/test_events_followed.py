@@ -35,7 +35,7 @@ OF_A_PLACE = {
     "noted": lambda: sw.Event(lambda t, v, y: v - 0.1, name="noted"),
     "end": lambda: sw.Event(lambda t, v, y: y - 0.3, terminal=5, name="end"),
 }
-#: Events at known times: listed ones of all or of each member, with and without a change, some that stop; zeros of the time alone.
+#: Events at known times: listed ones of all or of each member, with and without a change, some that stop.
 KNOWN = {
     "dose": lambda then, n: sw.Event(times=0.3, period=0.4, then=then, name="dose"),
     "each": lambda then, n: sw.Event(times=np.linspace(-0.5, 1.1, 2 * n).reshape(2, n), then=then, name="each"),
