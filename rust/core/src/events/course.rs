@@ -3,8 +3,10 @@
 
 use std::sync::Arc;
 
+use smallvec::smallvec;
+
 use super::{
-    motion::At,
+    motion::{At, Numbers},
     resets::{Instant, LARGEST_RATIO, MOST_IN_A_STEP, Memory, NO_TIME, Resting, SETTLED, larger},
     search::{LEAST_SHARE, Part, sign},
     watch::{Candidate, Candidates, Change, Located, Step, Stop, Watch},
@@ -26,7 +28,7 @@ pub(crate) struct Course {
     end: f64,
     /// Where the part begins, its state there, the length of the part before, and the ratio of that to the one before.
     pub start: f64,
-    state: Vec<f64>,
+    state: Numbers,
     flight: f64,
     ratio: f64,
     /// When the count of recent changes began, and that count.
@@ -46,7 +48,7 @@ impl Watch<'_> {
     pub(crate) fn course(&mut self, member: usize, [begin, end]: [f64; 2], state: &[f64]) -> Course {
         let mut memory = Memory::new(member, self.events());
         self.begin_member(&mut memory, begin, SHARE_OF_RUN * (end - begin), state, false);
-        let (flight, ratio, state) = (f64::NAN, f64::NAN, state.to_vec());
+        let (flight, ratio, state) = (f64::NAN, f64::NAN, state.into());
         Course { memory, begin, end, start: begin, state, flight, ratio, recent: begin, changes: 0 }
     }
 
@@ -64,7 +66,7 @@ impl Watch<'_> {
             return None;
         }
         let mut found: Vec<(Vec<Located>, Vec<Change>)> = Vec::new();
-        let (mut here, mut size): (Option<Located>, _) = (None, Vec::new());
+        let (mut here, mut size): (Option<Located>, _) = (None, Numbers::new());
         for (e, of_event) in changes.into_iter().enumerate() {
             let located = self.located(e, of_event.clone());
             let first = (0..located.len()).find(|more| self.ends(e, member, *more)).map(|more| &located[more]);
@@ -94,7 +96,7 @@ impl Watch<'_> {
     }
 
     /// Takes a member through an instant. Returns where it goes on, or stops; if it is at rest there, its state is noted.
-    fn arrive(&mut self, course: &mut Course, instant: Instant, rested: &mut Vec<(f64, Vec<f64>)>) -> Stop {
+    fn arrive(&mut self, course: &mut Course, instant: Instant, rested: &mut Vec<(f64, Numbers)>) -> Stop {
         let (step, t, share) = (Arc::clone(&instant.at.step), instant.at.t, instant.at.share);
         let lies = course.memory.at.clone();
         let after = self.happen(&mut course.memory, step.h, instant, &lies);
@@ -149,7 +151,7 @@ impl Watch<'_> {
         }
         if is_held {
             let (low, high, [g_low, g_high], [slope_low, slope_high]) = (0.0, 1.0, g, [0.0; 2]);
-            let part = Part { of: 0, low, high, g_low, g_high, slope_low, slope_high, state: Vec::new() };
+            let part = Part { of: 0, low, high, g_low, g_high, slope_low, slope_high, state: Numbers::new() };
             there.insert(0, Change { step: Arc::clone(step), part });
         }
         for change in &mut there {
@@ -193,6 +195,6 @@ impl Watch<'_> {
         let side = (0..nexts.len()).map(|e| sign(self.motion.g(e, At { member, t: known, state }))).collect();
         let due = nexts.iter().map(|next| *next == Some(known)).collect();
         let at = Located { step: Arc::clone(&stop.step), share: 1.0, t: known, state: state.clone() };
-        Some(Instant { at, side, due, size: vec![0.0; nexts.len()] })
+        Some(Instant { at, side, due, size: smallvec![0.0; nexts.len()] })
     }
 }

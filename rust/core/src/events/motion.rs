@@ -7,6 +7,8 @@ use super::{
     found::Found,
     watch::may_change,
 };
+use smallvec::SmallVec;
+
 use crate::{isa::Level, model::spec::Row};
 
 /// The slope of a quantity without derivative is its change over this share of a step, divided by the share.
@@ -128,6 +130,11 @@ impl Events<'_> {
     }
 }
 
+/// The numbers of a state, or one of each event: few, so that they stand in place.
+pub(crate) type Numbers = SmallVec<[f64; 6]>;
+/// Something of each event that is so or not.
+pub(crate) type Truths = SmallVec<[bool; 6]>;
+
 /// States of members at times, of `numbers` each, one after the other.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct States {
@@ -210,9 +217,9 @@ impl<'a> Motion<'a> {
     }
 
     /// The state that an event gives a member in place of this one.
-    pub(crate) fn changed(&mut self, e: usize, At { member, t, state }: At) -> Vec<f64> {
-        let Some(then) = &mut self.new_states[e] else { return state.to_vec() };
-        then.one(member, &[&[self.events.sign * t], state]).to_vec()
+    pub(crate) fn changed(&mut self, e: usize, At { member, t, state }: At) -> Numbers {
+        let Some(then) = &mut self.new_states[e] else { return state.into() };
+        then.one(member, &[&[self.events.sign * t], state]).into()
     }
 
     /// By how much a quantity would change in a step of such a length at the present rates.

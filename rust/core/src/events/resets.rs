@@ -2,10 +2,12 @@
 
 use std::sync::Arc;
 
+use smallvec::smallvec;
+
 use super::{
     evaluation::FEW,
     found::Rest,
-    motion::{At, Events, States},
+    motion::{At, Events, Numbers, States, Truths},
     search::{LEAST_SHARE, Part, located_alone, sign},
     watch::{Candidate, Change, Located, Side, Step, Stop, Watch},
 };
@@ -26,14 +28,14 @@ const FURTHER: f64 = 1.0 / (1u64 << 10) as f64;
 pub(crate) struct Memory {
     pub member: usize,
     /// The side from which it came to an event at which it is since that changed its state; 0 for others.
-    pub(super) at: Vec<Side>,
+    pub(super) at: Numbers,
     /// Whether the event leads it back to where it is.
     pub(super) led_back: Vec<bool>,
     /// Whether it has been there for a step or more, with the quantity at zero.
     pub(super) lain: Vec<bool>,
     /// Each quantity at the state, and one step before; NaN where that is not known.
-    pub now: Vec<f64>,
-    pub before: Vec<f64>,
+    pub now: Numbers,
+    pub before: Numbers,
     /// Where it is at rest.
     pub(super) rest: Option<Resting>,
     /// It does not go on, in this state.
@@ -53,11 +55,11 @@ impl Memory {
     pub(crate) fn new(member: usize, events: usize) -> Memory {
         Memory {
             member,
-            at: vec![0.0; events],
+            at: smallvec![0.0; events],
             led_back: vec![false; events],
             lain: vec![false; events],
-            now: vec![f64::NAN; events],
-            before: vec![f64::NAN; events],
+            now: smallvec![f64::NAN; events],
+            before: smallvec![f64::NAN; events],
             rest: None,
             ended: false,
             circle: vec![false; events],
@@ -93,8 +95,8 @@ impl Memory {
 
 /// What a member is after an instant at which events occurred.
 pub(super) struct After {
-    pub state: Vec<f64>,
-    pub at: Vec<Side>,
+    pub state: Numbers,
+    pub at: Numbers,
     /// The last event that changed the state.
     pub event: Option<usize>,
     pub stops: bool,
@@ -107,7 +109,7 @@ struct Ahead {
     t: f64,
     after: After,
     /// Each quantity where it ends.
-    g_end: Vec<f64>,
+    g_end: Numbers,
     /// The event that holds the member.
     returns: Option<usize>,
 }
@@ -116,16 +118,16 @@ struct Ahead {
 /// of its quantity at the ends of the step.
 pub(super) struct Instant {
     pub at: Located,
-    pub side: Vec<f64>,
-    pub due: Vec<bool>,
-    pub size: Vec<f64>,
+    pub side: Numbers,
+    pub due: Truths,
+    pub size: Numbers,
 }
 
 /// Where a member stops within a step.
 enum Arrived {
-    AtEnd(Vec<f64>),
-    Stops(f64, Vec<f64>),
-    Rests(usize, f64, Vec<f64>),
+    AtEnd(Numbers),
+    Stops(f64, Numbers),
+    Rests(usize, f64, Numbers),
 }
 
 /// As NumPy's, which returns NaN if one is.
@@ -137,7 +139,7 @@ pub(super) fn larger(a: f64, b: f64) -> f64 {
 pub(crate) struct Followed<'m> {
     pub memory: &'m mut Memory,
     /// The state, then that at the end.
-    pub state: Vec<f64>,
+    pub state: Numbers,
     /// The first step after which a number is not finite.
     pub first_bad: Option<i64>,
     /// Where it stopped.
@@ -214,9 +216,9 @@ impl Watch<'_> {
     }
 
     /// A little later: the time, the state there by the rates here, and that which an event makes of it.
-    fn further(&mut self, e: usize, h: f64, at: At) -> (f64, Vec<f64>, Vec<f64>) {
+    fn further(&mut self, e: usize, h: f64, at: At) -> (f64, Numbers, Numbers) {
         let (t, change) = (at.t + FURTHER * h, self.motion.change(at, h));
-        let state: Vec<f64> = at.state.iter().zip(change).map(|(x, change)| x + FURTHER * change).collect();
+        let state: Numbers = at.state.iter().zip(change).map(|(x, change)| x + FURTHER * change).collect();
         let back = self.motion.changed(e, At { t, state: &state, ..at });
         (t, state, back)
     }
@@ -232,17 +234,17 @@ impl Watch<'_> {
             return f64::INFINITY;
         }
         let mut part =
-            Part { of: 0, low: 0.0, high: 1.0, g_low: -1.0, g_high: 1.0, slope_low: 0.0, slope_high: 0.0, state: Vec::new() };
+            Part { of: 0, low: 0.0, high: 1.0, g_low: -1.0, g_high: 1.0, slope_low: 0.0, slope_high: 0.0, state: Numbers::new() };
         located_alone(&mut part, |share| {
             let holds = self.holds(memory, e, h, At { t: at.t + share * within, ..at });
-            (if holds { -1.0 } else { 1.0 }, Vec::new())
+            (if holds { -1.0 } else { 1.0 }, Numbers::new())
         })
     }
 
     /// An instant, with what occurs at it: of changes that are located at it or later in a part around it, the first says from which
     /// side the quantity comes.
-    pub(super) fn instant(&mut self, at: Located, found: &[(Vec<Located>, Vec<Change>)], size: Vec<f64>) -> Instant {
-        let (mut side, mut due) = (Vec::new(), vec![false; found.len()]);
+    pub(super) fn instant(&mut self, at: Located, found: &[(Vec<Located>, Vec<Change>)], size: Numbers) -> Instant {
+        let (mut side, mut due) = (Numbers::new(), smallvec![false; found.len()]);
         let here = At { member: at.step.member, t: at.t, state: &at.state };
         for (e, (occurs, changes)) in found.iter().enumerate() {
             side.push(sign(self.motion.g(e, here)));
@@ -261,15 +263,16 @@ impl Watch<'_> {
         let Instant { at, mut side, mut due, size } = instant;
         let (member, events, t) = (memory.member, self.events(), at.t);
         let mut state = at.state.clone();
-        let (mut stops, mut event, mut came, mut acted) = (false, None, vec![0.0; events], vec![false; events]);
+        let (mut stops, mut event, mut came, mut acted) =
+            (false, None, Numbers::from_elem(0.0, events), Truths::from_elem(false, events));
         let mut g = self.all_g(At { member, t, state: &state });
-        let held: Vec<f64> = (0..events).map(|e| if memory.led_back[e] { g[e] } else { 0.0 }).collect();
+        let held: Numbers = (0..events).map(|e| if memory.led_back[e] { g[e] } else { 0.0 }).collect();
         let counts = |e: usize| !due[e] && (g[e] == 0.0 || held[e] != 0.0);
-        let lies: Vec<Side> = (0..events).map(|e| if counts(e) { lies[e] } else { 0.0 }).collect();
+        let lies: Numbers = (0..events).map(|e| if counts(e) { lies[e] } else { 0.0 }).collect();
         side.iter_mut().zip(&lies).filter(|(_, lies)| **lies != 0.0).for_each(|(side, lies)| *side = *lies);
         let near = |e: usize| larger(if due[e] { AT * g[e].abs() } else { 0.0 }, LEAST_LEFT * size[e]);
         // Members are at no event that comes by the time.
-        let near: Vec<f64> = (0..events).map(|e| if self.is_timed(e) { -1.0 } else { near(e) }).collect();
+        let near: Numbers = (0..events).map(|e| if self.is_timed(e) { -1.0 } else { near(e) }).collect();
         for _ in 0..MOST_AT_ONCE {
             if due.contains(&true) {
                 acted.fill(false);
@@ -320,7 +323,7 @@ impl Watch<'_> {
                 0.0
             }
         };
-        let here: Vec<Side> = (0..events).map(here).collect();
+        let here: Numbers = (0..events).map(here).collect();
         for e in 0..events {
             memory.lain[e] = here[e] != 0.0 && came[e] == 0.0 && g[e] == 0.0;
             if came[e] != 0.0 {
@@ -329,7 +332,7 @@ impl Watch<'_> {
         }
         let circles = due.contains(&true) && !stops;
         if circles {
-            memory.circle = acted;
+            memory.circle.copy_from_slice(&acted);
             memory.led_back.fill(false);
         }
         After { state, at: here, event, stops, circles }
@@ -339,7 +342,7 @@ impl Watch<'_> {
     fn ahead(&mut self, memory: &mut Memory, stretch: &Arc<Step>, at: &mut [Side], (whole, way): (f64, f64)) -> Ahead {
         let (member, h) = (memory.member, way * whole);
         let (mut share, mut returns) = (f64::INFINITY, None);
-        let (mut found, mut size, mut g_ends) = (Vec::new(), Vec::new(), Vec::new());
+        let (mut found, mut size, mut g_ends) = (Vec::new(), Numbers::new(), Numbers::new());
         let (start, end) =
             (At { member, t: stretch.t, state: &stretch.start }, At { member, t: stretch.t + stretch.h, state: &stretch.end });
         for (e, side) in at.iter_mut().enumerate() {
@@ -431,7 +434,7 @@ impl Watch<'_> {
     fn through(&mut self, memory: &mut Memory, mut stretch: Arc<Step>) -> Arrived {
         let (end, whole, way) = (stretch.t + stretch.h, stretch.h.abs(), if stretch.h < 0.0 { -1.0 } else { 1.0 });
         let (mut flight, mut ratio) = (f64::NAN, f64::NAN);
-        let mut at = std::mem::replace(&mut memory.at, vec![0.0; self.events()]);
+        let mut at = std::mem::replace(&mut memory.at, smallvec![0.0; self.events()]);
         for resets in 0..=MOST_IN_A_STEP {
             let mut ahead = self.ahead(memory, &stretch, &mut at, (whole, way));
             let ends = ahead.share < f64::INFINITY;
@@ -481,7 +484,7 @@ impl Watch<'_> {
             let stretch_end = if h == 0.0 {
                 start.clone()
             } else {
-                self.motion.step(At { member: memory.member, t: ahead.t, state: &start }, h).to_vec()
+                self.motion.step(At { member: memory.member, t: ahead.t, state: &start }, h).into()
             };
             stretch = Arc::new(Step { t: ahead.t, h, start, end: stretch_end, ..*stretch });
             at = ahead.after.at;
@@ -536,8 +539,8 @@ impl Watch<'_> {
                 let [t, t_end] = [number, number + 1].map(|number| of_run.begin.at(member) + number as f64 * h);
                 let may = |e: usize| of_run.may_occur(e, member, [memory.before[e], memory.now[e], next[e]], [t, t_end]);
                 if memory.is_fresh() || (0..events).any(may) {
-                    let start = std::mem::replace(&mut each.state, end.to_vec());
-                    let whole = Step { member, number, t, h, t_end, start, end: end.to_vec(), window: None };
+                    let start = std::mem::replace(&mut each.state, end.into());
+                    let whole = Step { member, number, t, h, t_end, start, end: end.into(), window: None };
                     self.look(each, whole, next);
                     continue;
                 }
@@ -594,7 +597,7 @@ impl Watch<'_> {
     }
 
     /// The quantities of all events.
-    fn all_g(&mut self, at: At) -> Vec<f64> {
+    fn all_g(&mut self, at: At) -> Numbers {
         (0..self.events()).map(|e| self.motion.g(e, at)).collect()
     }
 

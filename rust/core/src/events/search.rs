@@ -1,5 +1,9 @@
 //! Where a quantity changes its sign within steps: `reference/events.py`, which says why, over many parts of steps at a time.
 
+use smallvec::{SmallVec, smallvec};
+
+use super::motion::Numbers;
+
 /// See `reference/events.py` for these.
 pub(super) const SPACING: f64 = 1.0 / (1u64 << 52) as f64;
 const SHARE: f64 = 1.0 / (1u64 << 48) as f64;
@@ -25,7 +29,7 @@ pub(super) struct Part {
     pub slope_low: f64,
     pub slope_high: f64,
     /// The state at its end.
-    pub state: Vec<f64>,
+    pub state: Numbers,
 }
 
 /// The quantity, its slope and the state at shares of steps; the numbers of states follow each other.
@@ -86,7 +90,7 @@ type Trial<'a> = &'a mut dyn FnMut(Shares) -> (Vec<f64>, Vec<f64>);
 /// Whether g may have two zeros in a step, by its values and slopes at both ends.
 pub(crate) fn bends(g: [f64; 2], slopes: [f64; 2]) -> bool {
     let [[g_low, g_high], [slope_low, slope_high]] = [g, slopes];
-    Part { of: 0, low: 0.0, high: 1.0, g_low, g_high, slope_low, slope_high, state: Vec::new() }.bends()
+    Part { of: 0, low: 0.0, high: 1.0, g_low, g_high, slope_low, slope_high, state: Numbers::new() }.bends()
 }
 
 /// Divides steps into parts in which g changes its sign once, ascending; and the numbers of the steps at whose start g is zero and
@@ -95,8 +99,8 @@ pub(super) fn parted(mut parts: Vec<Part>, look: Look) -> (Vec<Part>, Vec<usize>
     let (mut once, mut stuck) = (Vec::new(), Vec::new());
     let count = parts.iter().map(|part| part.of + 1).max().unwrap_or(0);
     for halving in 0..=MOST_HALVINGS_FROM_ZERO {
-        let mut halved = vec![0; count];
-        let each: Vec<_> = parts
+        let mut halved: SmallVec<[usize; 4]> = smallvec![0; count];
+        let each: SmallVec<[_; 4]> = parts
             .iter()
             .map(|part| {
                 let (begin, end) = part.sides();
@@ -135,7 +139,7 @@ pub(super) fn parted(mut parts: Vec<Part>, look: Look) -> (Vec<Part>, Vec<usize>
         let Looks { g, slopes, states } = look(&cuts);
         let numbers = states.len() / cuts.len();
         for (i, ((part, _), (_, middle))) in split.into_iter().zip(&cuts).enumerate() {
-            let (g, slope, state) = (g[i], slopes[i], states[i * numbers..(i + 1) * numbers].to_vec());
+            let (g, slope, state) = (g[i], slopes[i], Numbers::from_slice(&states[i * numbers..(i + 1) * numbers]));
             if part.g_low == 0.0 && g == 0.0 && part.g_high == 0.0 {
                 continue; // it stays at zero
             }
@@ -222,7 +226,7 @@ fn times_power(x: f64, power: i32) -> f64 {
 
 /// As `located` for one part; `trial` puts the state at a share of the step into the part, if that is at or after the change, as
 /// the sign of its quantity there says.
-pub(super) fn located_alone(part: &mut Part, mut trial: impl FnMut(f64) -> (f64, Vec<f64>)) -> f64 {
+pub(super) fn located_alone(part: &mut Part, mut trial: impl FnMut(f64) -> (f64, Numbers)) -> f64 {
     let mut bracket = Bracket::new(part);
     while let Some(share) = bracket.next() {
         let (g, state) = trial(share);

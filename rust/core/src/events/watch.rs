@@ -2,9 +2,11 @@
 
 use std::sync::{Arc, PoisonError};
 
+use smallvec::smallvec;
+
 use super::{
     found::Found,
-    motion::{At, Event, Events, Motion, States},
+    motion::{At, Event, Events, Motion, Numbers, States},
     search::{LEAST_SHARE, Looks, Part, located, located_alone, parted, sign},
 };
 use crate::step::watch::REACH;
@@ -22,8 +24,8 @@ pub(crate) struct Step {
     pub h: f64,
     /// The time at its end, or at that of the whole step of which it is a part.
     pub t_end: f64,
-    pub start: Vec<f64>,
-    pub end: Vec<f64>,
+    pub start: Numbers,
+    pub end: Numbers,
     /// After and until which times events count, if not in all of it.
     pub window: Option<[f64; 2]>,
 }
@@ -49,9 +51,9 @@ pub(crate) struct Noticed {
     /// The time of step 0, and how long steps are.
     pub begin: f64,
     pub h: f64,
-    pub start: Vec<f64>,
+    pub start: Numbers,
     /// Each quantity one step before.
-    pub before: Vec<f64>,
+    pub before: Numbers,
 }
 
 impl Noticed {
@@ -80,23 +82,23 @@ pub(super) struct Located {
     pub(super) step: Arc<Step>,
     pub(super) share: f64,
     pub(super) t: f64,
-    pub(super) state: Vec<f64>,
+    pub(super) state: Numbers,
 }
 
 /// Where a member stops: in this step.
 pub(crate) struct Stop {
     pub step: Arc<Step>,
     pub t: f64,
-    pub state: Vec<f64>,
+    pub state: Numbers,
     /// Whether it goes on from there.
     pub goes_on: bool,
     /// The states in which it was at rest before, and since when.
-    pub rested: Vec<(f64, Vec<f64>)>,
+    pub rested: Vec<(f64, Numbers)>,
 }
 
 impl Stop {
     /// Where it ends.
-    pub(super) fn at(step: Arc<Step>, t: f64, state: Vec<f64>) -> Stop {
+    pub(super) fn at(step: Arc<Step>, t: f64, state: Numbers) -> Stop {
         Stop { step, t, state, goes_on: false, rested: Vec::new() }
     }
 }
@@ -214,7 +216,7 @@ impl<'a> Watch<'a> {
                 let of_run = self.motion.events;
                 let may = |e: usize| of_run.may_occur(e, each.member, [before[e][i], now[e][i], next[e][i]], times);
                 if (0..events).any(may) {
-                    let [start, end] = [&starts, &ends].map(|states| states.numbers[i * n..(i + 1) * n].to_vec());
+                    let [start, end] = [&starts, &ends].map(|states| Numbers::from_slice(&states.numbers[i * n..(i + 1) * n]));
                     let events = (0..events).filter(|e| may(*e)).map(|e| (e, [now[e][i], next[e][i]])).collect();
                     if start.iter().chain(&end).all(|x| x.is_finite()) {
                         let step = Step {
@@ -274,10 +276,10 @@ impl<'a> Watch<'a> {
         if candidates.is_empty() {
             return Default::default();
         }
-        let slopes = if let [Candidate { step, .. }] = &candidates[..] {
+        let slopes: [Numbers; 2] = if let [Candidate { step, .. }] = &candidates[..] {
             let start = At { member: step.member, t: step.t, state: &step.start };
             let end = At { t: step.t + step.h, state: &step.end, ..start };
-            [start, end].map(|at| vec![self.motion.slope(e, at, step.h)])
+            [start, end].map(|at| smallvec![self.motion.slope(e, at, step.h)])
         } else {
             let (mut starts, mut ends) = (States::default(), States::default());
             for Candidate { step, .. } in &candidates {
@@ -285,7 +287,7 @@ impl<'a> Watch<'a> {
                 ends.push(step.member, step.t + step.h, &step.end);
             }
             let lengths: Vec<f64> = candidates.iter().map(|each| each.step.h).collect();
-            [&starts, &ends].map(|states| self.motion.slopes(e, states, &lengths))
+            [&starts, &ends].map(|states| self.motion.slopes(e, states, &lengths).into())
         };
         let whole = |(of, each): (usize, &Candidate)| {
             let ([g, g_high], [slope, slope_high], side) = (each.g, [slopes[0][of], slopes[1][of]], side(of));
@@ -327,7 +329,7 @@ impl<'a> Watch<'a> {
             let (share, state) = if t == step.t_end {
                 (1.0, step.end.clone())
             } else {
-                ((t - step.t) / step.h, self.motion.step(start, t - step.t).to_vec())
+                ((t - step.t) / step.h, self.motion.step(start, t - step.t).into())
             };
             let part = Part { of: 0, low: share, high: share, g_low, g_high: -g_low, slope_low: 0.0, slope_high: 0.0, state };
             changes.push(Change { step: Arc::clone(&step), part });
@@ -351,7 +353,7 @@ impl<'a> Watch<'a> {
             let (member, state) = (step.member, &step.start);
             vec![located_alone(part, |share| {
                 let h = share * step.h;
-                let there = motion.step(At { member, t: step.t, state }, h).to_vec();
+                let there: Numbers = motion.step(At { member, t: step.t, state }, h).into();
                 (motion.g(e, At { member, t: step.t + h, state: &there }), there)
             })]
         } else {
@@ -523,9 +525,9 @@ pub fn locate(events: &Events, e: usize, brackets: &Brackets) -> (Vec<f64>, Vec<
     let changes = each.map(|((member, numbers), states)| {
         let (start, end) = states.split_at(n);
         let (t, h, [low, high, g_low, g_high]) = (numbers[0], numbers[1], [2, 3, 4, 5].map(|i| numbers[i]));
-        let (slope_low, slope_high, state) = (0.0, 0.0, end.to_vec());
-        let (member, t_end, start) = (*member as usize, t + h, start.to_vec());
-        let step = Step { member, number: 0, t, h, t_end, start, end: Vec::new(), window: None };
+        let (slope_low, slope_high, state) = (0.0, 0.0, end.into());
+        let (member, t_end, start) = (*member as usize, t + h, start.into());
+        let step = Step { member, number: 0, t, h, t_end, start, end: Numbers::new(), window: None };
         Change { step: Arc::new(step), part: Part { of: 0, low, high, g_low, g_high, slope_low, slope_high, state } }
     });
     let located = Watch::new(events).located(e, changes.collect());

@@ -293,7 +293,7 @@ impl<'a> Looks<'a> {
         }
         let window = Some([self.since[lane], end]);
         let number = pace.accepted as i64;
-        let step = Step { member, number, t: pace.t, h, t_end, start, end: there.numbers, window };
+        let step = Step { member, number, t: pace.t, h, t_end, start: start.into(), end: there.numbers.into(), window };
         self.take(vec![(lane, Candidates { step: Arc::new(step), events })]).pop().map(|(_, stop)| stop)
     }
 }

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use crate::{
     events::{
         evaluation::Filled,
-        motion::{Event, Events},
+        motion::{Event, Events, Numbers},
         resets::{Followed, Memory},
         watch::{Candidates, Noticed, Step, Stop, Watch},
     },
@@ -183,7 +183,7 @@ impl<T: Real> Looks<'_, '_, T> {
             let state_of = |states: &[T], lane: usize| states.iter().skip(lane).step_by(lanes).map(|x| x.wide()).collect();
             if !self.begun {
                 for (lane, memory) in self.memories.iter_mut().enumerate() {
-                    let state: Vec<f64> = state_of(&self.states, lane);
+                    let state: Numbers = state_of(&self.states, lane);
                     let t = self.watch.motion.events.begin.at(memory.member) + k as f64 * h;
                     self.watch.begin_member(memory, t, h, &state, on.carried);
                 }
@@ -390,7 +390,7 @@ impl<T: Real> Looks<'_, '_, T> {
             return;
         }
         seen.sort_by_key(|each| (each.lane, each.row));
-        let state = |lane: usize, row: usize| -> Vec<f64> {
+        let state = |lane: usize, row: usize| -> Numbers {
             self.states[row * block..(row + 1) * block].iter().skip(lane).step_by(lanes).map(|x| x.wide()).collect()
         };
         let mut candidates = Vec::new();
