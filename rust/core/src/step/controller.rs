@@ -162,11 +162,14 @@ impl<N: Number> Pace<N> {
     pub const NUMBERS: usize = NUMBERS;
     /// Places of the time and of the step to try next among them.
     pub(crate) const PLACES: [usize; 2] = [0, 1];
-    /// The place of the number of accepted attempts.
+    /// The places of the length of the step before, of the number of accepted attempts and of that of extra steps.
+    pub(crate) const BEFORE: usize = 13;
+    /// See `BEFORE`.
     pub const ACCEPTED: usize = 15;
+    pub(crate) const EXTRA_STEPS: usize = 17;
 
     /// Where the next step ends, and whether that is at the wall.
-    fn reach(&self) -> (N, N::Truth) {
+    pub(crate) fn reach(&self) -> (N, N::Truth) {
         let ends = self.wall.below(self.t + self.h);
         (N::choose(ends, self.wall, self.t + self.h), ends)
     }
