@@ -152,7 +152,13 @@ impl AdaptiveBatch for AdaptiveLanes {
     }
 
     fn row(&self, number: usize) -> Option<&[f64]> {
-        self.state.chunks_exact(self.step.lanes()).nth(number)
+        let lanes = self.step.lanes();
+        self.state.get(number * lanes..(number + 1) * lanes)
+    }
+
+    fn row_mut(&mut self, number: usize) -> Option<&mut [f64]> {
+        let lanes = self.step.lanes();
+        self.state.get_mut(number * lanes..(number + 1) * lanes)
     }
 
     fn set_pace(&mut self, lane: usize, pace: Pace<f64>) {
@@ -215,7 +221,7 @@ impl AdaptiveBatch for AdaptiveLanes {
         let first = (n + Pace::<f64>::NUMBERS + self.scales) * lanes;
         self.starts.clear();
         self.starts.extend_from_slice(&self.state[..(n + 1) * lanes]); // the time stands behind the state
-        let before = &self.state[(n + Pace::<f64>::BEFORE) * lanes..][..lanes];
+        let before = &self.state[Pace::places(n).before * lanes..][..lanes];
         self.starts.extend(before.iter().map(|before| share_of(1.0, *before)));
         if self.compensated {
             self.starts.extend_from_slice(&self.state[first - n * lanes..first]);
@@ -226,11 +232,6 @@ impl AdaptiveBatch for AdaptiveLanes {
         let first = (self.numbers + Pace::<f64>::NUMBERS + self.scales) * self.step.lanes();
         let sums = Sums { of: self, lane, terms: &self.state[first..], times, states };
         with_isa!(self.level.of_loops(), |isa| isa.run(sums));
-    }
-
-    fn count_extra(&mut self, lane: usize, steps: usize) {
-        let lanes = self.step.lanes();
-        self.state[(self.numbers + Pace::<f64>::EXTRA_STEPS) * lanes + lane] += steps as f64;
     }
 
     fn attempt_by_terms(&mut self, spec: &Spec, lane: usize, member: usize) {

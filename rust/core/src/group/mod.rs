@@ -109,6 +109,11 @@ pub trait AdaptiveBatch: Send {
         None
     }
 
+    /// The same, to write; None, too, where the rows of the state are not numbers of 64 bits.
+    fn row_mut(&mut self, _number: usize) -> Option<&mut [f64]> {
+        None
+    }
+
     /// Sets the step-size control of a lane.
     fn set_pace(&mut self, lane: usize, pace: Pace<f64>);
 
@@ -158,9 +163,6 @@ pub trait AdaptiveBatch: Send {
 
     /// The states of one lane at times within the step that began at the start that was kept, number by number.
     fn sum_terms(&self, _lane: usize, _times: &[f64; SIDE], _states: &mut [[f64; SIDE]]) {}
-
-    /// Counts so many extra steps of a lane.
-    fn count_extra(&mut self, _lane: usize, _steps: usize) {}
 
     /// Sets the flag at which an attempt that may take long stops early.
     fn set_stop_flag(&mut self, _stop: &Stop) {}

@@ -129,6 +129,8 @@ impl Prepared {
 struct Worker<'a> {
     plan: &'a AdaptiveRun<'a>,
     group: Box<dyn AdaptiveBatch>,
+    /// The rows of paces, where lanes stand side by side.
+    places: Pace<usize>,
     waypoints: WaypointSearch,
     /// Room for the numbers of states within a step.
     sums: Vec<[f64; SIDE]>,
@@ -154,7 +156,8 @@ impl<'a> Worker<'a> {
         let alike = group.has_sums() && plan.at.iter().all(|row| row.0.len() == 1);
         let times = plan.at.iter().map(|row| row.at(0)).chain([f64::INFINITY; SIDE]);
         let times = if alike { times.collect() } else { Vec::new() };
-        Worker { plan, group, waypoints, sums, times, looks }
+        let places = Pace::places(plan.v.len() + plan.y.len());
+        Worker { plan, group, places, waypoints, sums, times, looks }
     }
 
     fn part(&mut self, mut part: Part, go_on: GoOn) -> Result<(), Error> {
@@ -182,6 +185,9 @@ impl<'a> Worker<'a> {
             for (lane, assigned) in assignments.iter_mut().enumerate() {
                 // An extra step whose error was not tolerated leaves a step to try.
                 if runs[lane] && assigned.as_ref().is_some_and(|assigned| assigned.origin.is_none()) {
+                    continue;
+                }
+                if assigned.as_mut().is_some_and(|assigned| self.go_within(&mut part, lane, assigned)) {
                     continue;
                 }
                 if let Some(taken) = assigned.take() {
@@ -533,7 +539,7 @@ impl<'a> Worker<'a> {
             self.group.keep_starts();
             self.group.set_pace(lane, Pace { target: self.last(member), ..pace });
             let saved = self.save_sums(part, lane, assigned, pace.reach().0);
-            self.group.count_extra(lane, saved);
+            self.count_extra(lane, saved);
             return;
         }
         pace.extra = pace.target - pace.t;
@@ -543,6 +549,50 @@ impl<'a> Worker<'a> {
         self.save(part, lane, assigned);
         assigned.next += 1;
         self.group.set_state(lane, &origin);
+    }
+
+    /// Of a lane at the start of a held step: saves the state of the extra step that it has made, and sets the next one, or lets the
+    /// held step be taken. Does what [`Self::update_lane`] does, and moves nothing else. Returns false where that has more to do.
+    fn go_within(&mut self, part: &mut Part, lane: usize, assigned: &mut Assignment) -> bool {
+        let (p, n, made) = (self.plan.v.len(), self.plan.v.len() + self.plan.y.len(), assigned.origin.is_some());
+        let Pace { t, h, target: until, extra, held, wall, rejected, .. } = self.places;
+        let at = |place: usize| self.group.row(place).map_or(f64::NAN, |row| row[lane]);
+        let next = assigned.next + usize::from(made);
+        let Some(target) = self.plan.at.get(next).map(|row| row.at(part.first + assigned.member)) else { return false };
+        let (t, rejected, is_held) = (at(t), at(rejected), at(held) > 0.0);
+        let is_next = assigned.origin.as_ref().map_or(at(until) == target, |(_, before)| rejected <= *before);
+        let holds = target < (t + at(h)).min(at(wall));
+        let is_other = assigned.stop.is_some() || self.plan.every > 0 || self.group.has_terms();
+        if !is_next || !is_held || is_other || self.group.row_mut(until).is_none() {
+            return false;
+        }
+        if let Some((origin, _)) = &assigned.origin {
+            for (i, start) in origin.iter().enumerate() {
+                let Some(row) = self.group.row_mut(i) else { return false };
+                let saved = if i < p {
+                    part.saved_v.row(assigned.next * p + i)
+                } else {
+                    part.saved_y.row(assigned.next * (n - p) + i - p)
+                };
+                saved[assigned.member] = std::mem::replace(&mut row[lane], *start);
+            }
+        } else {
+            assigned.origin = Some((self.group.state(lane), rejected));
+        }
+        let set = if holds { (extra, target - t) } else { (held, 0.0) };
+        for (place, number) in [(until, target), set] {
+            self.group.row_mut(place).into_iter().for_each(|row| row[lane] = number);
+        }
+        if !holds {
+            assigned.origin = None;
+        }
+        assigned.next = next;
+        true
+    }
+
+    /// Counts so many extra steps of a lane.
+    fn count_extra(&mut self, lane: usize, steps: usize) {
+        self.group.row_mut(self.places.extra_steps).into_iter().for_each(|row| row[lane] += steps as f64);
     }
 
     /// Saves the states of a lane at times before the end of a step whose start was kept, as sums of its coefficients. Returns how
@@ -577,13 +627,13 @@ impl<'a> Worker<'a> {
 
     /// Saves the states within the steps that lanes have just made, and at their ends.
     fn save_within(&mut self, part: &mut Part, assignments: &mut [Option<Assignment>]) {
-        let ends = self.group.row(self.plan.v.len() + self.plan.y.len()).map_or_else(Vec::new, <[f64]>::to_vec);
+        let ends = self.group.row(self.places.t).map_or_else(Vec::new, <[f64]>::to_vec);
         for ((lane, assigned), end) in assignments.iter_mut().enumerate().zip(ends) {
             let Some(assigned) = assigned else { continue };
             let member = part.first + assigned.member;
             if self.plan.at.get(assigned.next).is_some_and(|row| row.at(member) < end) {
                 let saved = self.save_sums(part, lane, assigned, end);
-                self.group.count_extra(lane, saved + 1); // with the step, as if it had been held
+                self.count_extra(lane, saved + 1); // with the step, as if it had been held
             }
             while self.plan.at.get(assigned.next).is_some_and(|row| row.at(member) <= end) {
                 self.save(part, lane, assigned);

@@ -22,7 +22,7 @@ macro_rules! numbers {
             $($(#[$of])* pub $number: N,)*
         }
 
-        impl<N: Number> $name<N> {
+        impl<N: Copy> $name<N> {
             /// From its numbers.
             pub fn of([$($number),*]: [N; NUMBERS]) -> Self {
                 $name { $($number),* }
@@ -98,6 +98,13 @@ pub(crate) struct Outlook<N: Number> {
     pub runs: N::Truth,
 }
 
+impl Pace<usize> {
+    /// The places of its numbers, which stand behind so many others.
+    pub(crate) fn places(others: usize) -> Self {
+        Pace::of(std::array::from_fn(|i| others + i))
+    }
+}
+
 impl Pace<f64> {
     /// Whether there is a step of the run to try.
     pub(crate) fn runs(&self, budget: f64) -> bool {
@@ -162,11 +169,8 @@ impl<N: Number> Pace<N> {
     pub const NUMBERS: usize = NUMBERS;
     /// Places of the time and of the step to try next among them.
     pub(crate) const PLACES: [usize; 2] = [0, 1];
-    /// The places of the length of the step before, of the number of accepted attempts and of that of extra steps.
-    pub(crate) const BEFORE: usize = 13;
-    /// See `BEFORE`.
+    /// The place of the number of accepted attempts.
     pub const ACCEPTED: usize = 15;
-    pub(crate) const EXTRA_STEPS: usize = 17;
 
     /// Where the next step ends, and whether that is at the wall.
     pub(crate) fn reach(&self) -> (N, N::Truth) {
