@@ -615,6 +615,23 @@ def test_many_saved_states_of_a_batch_are_those_of_the_reference(control: Any, f
         assert np.array_equal(ours.work, sw.integrate(bodies, "taylor", **ask, backend="numpy").work)
 
 
+@looped("own, backward", [(False, False), (True, False), (False, True)])
+def test_states_within_steps_are_those_of_the_reference(own: bool, backward: bool) -> None:
+    """Of each step none, one, or more than the core sums at once; at its ends, at jumps; each member at its own times."""
+    sign, duffing = -1.0 if backward else 1.0, sw.system(lambda t, v, y: y - y**3 - 0.1 * v + np.cos(t))
+    ask: dict[str, Any] = {"v": 0.0, "y": np.linspace(0.5, 1.5, 20), "tolerance": 1e-8, "jumps": [sign * 0.7]}
+    ends = sw.integrate(duffing, "taylor", at=[sign * 1.2], every=1, max_steps=99, **ask).t[:, 0]
+    ends = ends[(sign * ends > 0.0) & (sign * ends < 1.2)]
+    at = np.concatenate([np.linspace(0.0, 0.6, 70), [0.7, 0.8], sign * ends, np.linspace(1.0, 1.2, 60), [6.0, 9.0]])
+    at = sign * np.unique(at)
+    counts = np.histogram(sign * at, np.sort(sign * ends))[0]
+    assert counts.max() > 16
+    if own:
+        at = np.linspace(0.5, 1.0, 20) * at[:, np.newaxis]
+    run = assert_equal_ways(duffing, "taylor", at=at, **ask, ways=("by the reference", "alone", "in pieces"))
+    assert run.paces.rejected.max() == 0
+
+
 def test_a_run_that_goes_on_finds_the_coefficients_of_its_held_step_again() -> None:
     bodies, at = sw.NBody([1.0, 0.5, 0.2], force="newton", softening=0.1), np.linspace(0.02, 3.0, 60)
     whole = sw.integrate(bodies, "taylor", **three_bodies(20), tolerance=1e-8, at=at)

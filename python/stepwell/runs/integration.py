@@ -105,8 +105,8 @@ def integrate(
             taylor, and for stiff equations rosenbrock23, rodas4, rodas5p.
         at: with a tolerance, the times at which to save the state, from t0 on, ascending, or descending for a run backward in
             time; shape (times,), or (times, *batch) for times of each member. A state within a step is computed by an extra step
-            from its start. Steps do not depend on these times, unless the extra step errs by more than is tolerated: the
-            step missed something and is rejected.
+            from its start, by ``taylor`` as the sum of its series. Steps do not depend on these times, unless the extra step
+            errs by more than is tolerated: the step missed something and is rejected.
         control: an ``EnergyControl`` or a ``Projection``, to keep the energy constant, or another control or projection; with a
             tolerance, too, where a projection acts on accepted steps. Verlet and leapfrog go without.
         force: what is added to v̇ in every stage, constant over the run, in the units of v per unit of time: for bodies a force

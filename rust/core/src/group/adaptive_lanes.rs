@@ -6,13 +6,13 @@ use super::AdaptiveBatch;
 use crate::{
     aligned::Aligned,
     error::Error,
-    isa::Level,
+    isa::{Level, Task, with_isa},
     model::spec::Spec,
     stage::{Clock, PreparedStage, Stage},
     step::{
         key::StepKind,
         pace::Pace,
-        series_pace::{share_of, sum},
+        series_pace::{SIDE, share_of, sums},
         tapes::{Tapes, Traced},
     },
 };
@@ -23,11 +23,16 @@ pub struct AdaptiveLanes {
     /// Numbers of v and y, and those that stand behind the pace.
     numbers: usize,
     scales: usize,
+    /// How many coefficients of a series each number has.
+    order: usize,
     /// Whether the last of these are what rounding left out of each number of the state.
     compensated: bool,
     step: PreparedStage,
     /// Rows of v, of y, of the paces, of the sizes and, of a series, of its coefficients.
     state: Aligned,
+    /// At the start of a step within which states are wanted: rows of the state, of the time, of one over the unit of time of the
+    /// coefficients, and of what rounding left out.
+    starts: Vec<f64>,
     /// What goes by one lane at a time, from its first use on: attempts by known coefficients, and where a member stands at the
     /// start.
     by_terms: Option<OneLane>,
@@ -65,6 +70,33 @@ impl OneLane {
     }
 }
 
+/// States of a lane within a step: see [`AdaptiveBatch::sum_terms`].
+struct Sums<'a> {
+    of: &'a AdaptiveLanes,
+    lane: usize,
+    terms: &'a [f64],
+    times: &'a [f64; SIDE],
+    states: &'a mut [[f64; SIDE]],
+}
+
+impl Task for Sums<'_> {
+    #[inline(always)]
+    fn run(self) {
+        let (lanes, n) = (self.of.step.lanes(), self.of.numbers);
+        let starts = &self.of.starts[self.lane..];
+        let (start, per_unit) = (starts[n * lanes], starts[(n + 1) * lanes]);
+        let mut shares = [0.0; SIDE];
+        for (share, time) in shares.iter_mut().zip(self.times) {
+            *share = (time - start) * per_unit;
+        }
+        for (i, number) in self.states.iter_mut().enumerate() {
+            let low = if self.of.compensated { starts[(n + 2 + i) * lanes] } else { 0.0 };
+            let terms = &self.terms[i * lanes + self.lane..];
+            *number = sums((starts[i * lanes], low), (terms, n * lanes), self.of.order, &shares);
+        }
+    }
+}
+
 impl AdaptiveLanes {
     /// For a run of so many members.
     pub fn new(traced: &Traced, spec: &Spec, level: Level, members: usize, budget: f64) -> Result<AdaptiveLanes, Error> {
@@ -75,7 +107,21 @@ impl AdaptiveLanes {
         let all = tapes.step.split.body.next.len();
         let state = Aligned::new(all * step.lanes());
         let compensated = acceptance.compensated;
-        Ok(AdaptiveLanes { state, step, numbers, scales, compensated, by_terms: None, begin: None, level, budget, tapes })
+        let order = (all - numbers - Pace::<f64>::NUMBERS - scales) / numbers.max(1);
+        Ok(AdaptiveLanes {
+            state,
+            starts: Vec::new(),
+            step,
+            numbers,
+            scales,
+            order,
+            compensated,
+            by_terms: None,
+            begin: None,
+            level,
+            budget,
+            tapes,
+        })
     }
 }
 
@@ -106,7 +152,13 @@ impl AdaptiveBatch for AdaptiveLanes {
     }
 
     fn row(&self, number: usize) -> Option<&[f64]> {
-        self.state.chunks_exact(self.step.lanes()).nth(number)
+        let lanes = self.step.lanes();
+        self.state.get(number * lanes..(number + 1) * lanes)
+    }
+
+    fn row_mut(&mut self, number: usize) -> Option<&mut [f64]> {
+        let lanes = self.step.lanes();
+        self.state.get_mut(number * lanes..(number + 1) * lanes)
     }
 
     fn set_pace(&mut self, lane: usize, pace: Pace<f64>) {
@@ -160,20 +212,26 @@ impl AdaptiveBatch for AdaptiveLanes {
         Pace::steps_left(|i| &self.state[(self.numbers + i) * lanes..][..lanes])
     }
 
-    fn sum_of_terms(&self, lane: usize, length: f64, state: &mut [f64]) -> bool {
-        if !self.tapes.sums {
-            return false;
-        }
+    fn has_sums(&self) -> bool {
+        self.tapes.sums
+    }
+
+    fn keep_starts(&mut self) {
         let (lanes, n) = (self.step.lanes(), self.numbers);
-        let at = |row: usize| self.state[row * lanes + lane];
-        let first = n + Pace::<f64>::NUMBERS + self.scales;
-        let order = (self.state.len() / lanes - first) / n.max(1);
-        let share = share_of(length, self.pace(lane).before);
-        let low = |i: usize| if self.compensated { at(first - n + i) } else { 0.0 };
-        for (i, number) in state.iter_mut().enumerate() {
-            *number = sum((at(i), low(i)), |k| at(first + k * n + i), order, share);
+        let first = (n + Pace::<f64>::NUMBERS + self.scales) * lanes;
+        self.starts.clear();
+        self.starts.extend_from_slice(&self.state[..(n + 1) * lanes]); // the time stands behind the state
+        let before = &self.state[Pace::places(n).before * lanes..][..lanes];
+        self.starts.extend(before.iter().map(|before| share_of(1.0, *before)));
+        if self.compensated {
+            self.starts.extend_from_slice(&self.state[first - n * lanes..first]);
         }
-        true
+    }
+
+    fn sum_terms(&self, lane: usize, times: &[f64; SIDE], states: &mut [[f64; SIDE]]) {
+        let first = (self.numbers + Pace::<f64>::NUMBERS + self.scales) * self.step.lanes();
+        let sums = Sums { of: self, lane, terms: &self.state[first..], times, states };
+        with_isa!(self.level.of_loops(), |isa| isa.run(sums));
     }
 
     fn attempt_by_terms(&mut self, spec: &Spec, lane: usize, member: usize) {

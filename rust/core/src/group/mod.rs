@@ -7,7 +7,7 @@ pub mod single_lanes;
 use crate::{
     model::spec::Spec,
     stage::{Force, Stop},
-    step::pace::Pace,
+    step::{pace::Pace, series_pace::SIDE},
     tape::real::Real,
 };
 
@@ -109,6 +109,11 @@ pub trait AdaptiveBatch: Send {
         None
     }
 
+    /// The same, to write; None, too, where the rows of the state are not numbers of 64 bits.
+    fn row_mut(&mut self, _number: usize) -> Option<&mut [f64]> {
+        None
+    }
+
     /// Sets the step-size control of a lane.
     fn set_pace(&mut self, lane: usize, pace: Pace<f64>);
 
@@ -148,10 +153,16 @@ pub trait AdaptiveBatch: Send {
     /// One attempt of one lane, at the start of a step whose coefficients are known.
     fn attempt_by_terms(&mut self, _spec: &Spec, _lane: usize, _member: usize) {}
 
-    /// The state of one lane after a part of a step whose coefficients are known, if it is the sum of the series alone.
-    fn sum_of_terms(&self, _lane: usize, _length: f64, _state: &mut [f64]) -> bool {
+    /// Whether states within a step are sums of its coefficients alone, which [`AdaptiveBatch::sum_terms`] makes.
+    fn has_sums(&self) -> bool {
         false
     }
+
+    /// Keeps where lanes stand, before an attempt of a step within which states are wanted.
+    fn keep_starts(&mut self) {}
+
+    /// The states of one lane at times within the step that began at the start that was kept, number by number.
+    fn sum_terms(&self, _lane: usize, _times: &[f64; SIDE], _states: &mut [[f64; SIDE]]) {}
 
     /// Sets the flag at which an attempt that may take long stops early.
     fn set_stop_flag(&mut self, _stop: &Stop) {}

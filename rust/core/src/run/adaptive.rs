@@ -17,7 +17,7 @@ use crate::{
     events::watch::Stop as EventStop,
     group::AdaptiveBatch,
     stage::{Machine, Stop},
-    step::{key::StepKind, pace::Pace, tapes::Traced},
+    step::{key::StepKind, pace::Pace, series_pace::SIDE, tapes::Traced},
 };
 
 pub use super::adaptive_plan::{AdaptiveRun, Arrays};
@@ -129,7 +129,13 @@ impl Prepared {
 struct Worker<'a> {
     plan: &'a AdaptiveRun<'a>,
     group: Box<dyn AdaptiveBatch>,
+    /// The rows of paces, where lanes stand side by side.
+    places: Pace<usize>,
     waypoints: WaypointSearch,
+    /// Room for the numbers of states within a step.
+    sums: Vec<[f64; SIDE]>,
+    /// The times to keep the state at, if they are those of all members, and some behind them that never come.
+    times: Vec<f64>,
     /// Where events are looked for.
     looks: Option<Looks<'a>>,
 }
@@ -146,7 +152,12 @@ impl<'a> Worker<'a> {
     fn of(plan: &'a AdaptiveRun<'a>, group: Box<dyn AdaptiveBatch>) -> Self {
         let waypoints = WaypointSearch::new(plan.v.len() + plan.y.len());
         let looks = plan.events.map(|events| Looks::new(events, group.lanes()));
-        Worker { plan, group, waypoints, looks }
+        let sums = vec![[0.0; SIDE]; plan.v.len() + plan.y.len()];
+        let alike = group.has_sums() && plan.at.iter().all(|row| row.0.len() == 1);
+        let times = plan.at.iter().map(|row| row.at(0)).chain([f64::INFINITY; SIDE]);
+        let times = if alike { times.collect() } else { Vec::new() };
+        let places = Pace::places(plan.v.len() + plan.y.len());
+        Worker { plan, group, places, waypoints, sums, times, looks }
     }
 
     fn part(&mut self, mut part: Part, go_on: GoOn) -> Result<(), Error> {
@@ -176,16 +187,28 @@ impl<'a> Worker<'a> {
                 if runs[lane] && assigned.as_ref().is_some_and(|assigned| assigned.origin.is_none()) {
                     continue;
                 }
+                if assigned.as_mut().is_some_and(|assigned| self.go_within(&mut part, lane, assigned)) {
+                    continue;
+                }
                 if let Some(taken) = assigned.take() {
                     *assigned = self.update_lane(&mut part, lane, taken, &mut waiting, go_on)?;
                 }
             }
-            let attempts = if self.looks.is_some() { 1 } else { self.attempts_before_check(&assignments) };
+            // Lanes with sums do not stop at saved times but at the last one.
+            let last = self.plan.at.len().saturating_sub(1);
+            let is_within = self.group.has_sums() && assignments.iter().flatten().any(|assigned| assigned.next < last);
+            let attempts = if self.looks.is_some() || is_within { 1 } else { self.attempts_before_check(&assignments) };
+            if is_within {
+                self.group.keep_starts();
+            }
             if let Some(looks) = &mut self.looks {
                 let first = part.first;
                 looks.before(&*self.group, |lane| Some(first + assignments[lane].as_ref()?.member));
             }
             self.waypoints.attempt(&mut *self.group, &mut part, attempts, &mut assignments);
+            if is_within {
+                self.save_within(&mut part, &mut assignments);
+            }
             if self.plan.every == 0 {
                 self.group.find_running(self.plan.budget as f64, &mut runs);
             }
@@ -211,6 +234,11 @@ impl<'a> Worker<'a> {
             looks.watch.end();
         }
         Ok(())
+    }
+
+    /// The last time of a member.
+    fn last(&self, member: usize) -> f64 {
+        self.plan.at.last().map_or(f64::NAN, |row| row.at(member))
     }
 
     /// Whether an attempt of a member may take long.
@@ -457,6 +485,9 @@ impl<'a> Worker<'a> {
                 continue;
             }
             if !is_full && assigned.next < plan.at.len() {
+                if self.group.has_sums() {
+                    pace.target = self.last(part.first + assigned.member);
+                }
                 if pace.holds() {
                     pace.extra = pace.target - pace.t;
                     assigned.origin = Some((self.group.state(lane), pace.rejected));
@@ -514,16 +545,12 @@ impl<'a> Worker<'a> {
             self.waypoints.expect_after(accepted);
             return;
         }
-        let mut state = vec![0.0; self.plan.v.len() + self.plan.y.len()];
-        while pace.holds() && self.group.sum_of_terms(lane, pace.target - pace.t, &mut state) {
-            self.write(part, assigned, &state);
-            assigned.next += 1;
-            pace.extra_steps += 1.0;
-            let Some(target) = self.plan.at.get(assigned.next) else { return self.group.set_pace(lane, pace) };
-            pace.target = target.at(member);
-        }
-        if !pace.holds() {
-            return self.group.set_pace(lane, pace);
+        if self.group.has_sums() {
+            self.group.keep_starts();
+            self.group.set_pace(lane, Pace { target: self.last(member), ..pace });
+            let saved = self.save_sums(part, lane, assigned, pace.reach().0);
+            self.count_extra(lane, saved);
+            return;
         }
         pace.extra = pace.target - pace.t;
         let origin = self.group.state(lane);
@@ -532,6 +559,97 @@ impl<'a> Worker<'a> {
         self.save(part, lane, assigned);
         assigned.next += 1;
         self.group.set_state(lane, &origin);
+    }
+
+    /// Of a lane at the start of a held step: saves the state of the extra step that it has made, and sets the next one, or lets the
+    /// held step be taken. Does what [`Self::update_lane`] does, and moves nothing else. Returns false where that has more to do.
+    fn go_within(&mut self, part: &mut Part, lane: usize, assigned: &mut Assignment) -> bool {
+        let (p, n, made) = (self.plan.v.len(), self.plan.v.len() + self.plan.y.len(), assigned.origin.is_some());
+        let Pace { t, h, target: until, extra, held, wall, rejected, .. } = self.places;
+        let at = |place: usize| self.group.row(place).map_or(f64::NAN, |row| row[lane]);
+        let next = assigned.next + usize::from(made);
+        let Some(target) = self.plan.at.get(next).map(|row| row.at(part.first + assigned.member)) else { return false };
+        let (t, rejected, is_held) = (at(t), at(rejected), at(held) > 0.0);
+        let is_next = assigned.origin.as_ref().map_or(at(until) == target, |(_, before)| rejected <= *before);
+        let holds = target < (t + at(h)).min(at(wall));
+        let is_other = assigned.stop.is_some() || self.plan.every > 0 || self.group.has_terms();
+        if !is_next || !is_held || is_other || self.group.row_mut(until).is_none() {
+            return false;
+        }
+        if let Some((origin, _)) = &assigned.origin {
+            for (i, start) in origin.iter().enumerate() {
+                let Some(row) = self.group.row_mut(i) else { return false };
+                let saved = if i < p {
+                    part.saved_v.row(assigned.next * p + i)
+                } else {
+                    part.saved_y.row(assigned.next * (n - p) + i - p)
+                };
+                saved[assigned.member] = std::mem::replace(&mut row[lane], *start);
+            }
+        } else {
+            assigned.origin = Some((self.group.state(lane), rejected));
+        }
+        let set = if holds { (extra, target - t) } else { (held, 0.0) };
+        for (place, number) in [(until, target), set] {
+            self.group.row_mut(place).into_iter().for_each(|row| row[lane] = number);
+        }
+        if !holds {
+            assigned.origin = None;
+        }
+        assigned.next = next;
+        true
+    }
+
+    /// Counts so many extra steps of a lane.
+    fn count_extra(&mut self, lane: usize, steps: usize) {
+        self.group.row_mut(self.places.extra_steps).into_iter().for_each(|row| row[lane] += steps as f64);
+    }
+
+    /// Saves the states of a lane at times before the end of a step whose start was kept, as sums of its coefficients. Returns how
+    /// many.
+    fn save_sums(&mut self, part: &mut Part, lane: usize, assigned: &mut Assignment, end: f64) -> usize {
+        let (plan, member, first) = (self.plan, part.first + assigned.member, assigned.next);
+        let mut states = std::mem::take(&mut self.sums);
+        loop {
+            // Numbers that were just written one by one are read late as one vector, so times of all members stand side by side.
+            let own: [f64; SIDE];
+            let times = match self.times.get(assigned.next..).and_then(<[f64]>::first_chunk::<SIDE>) {
+                Some(times) => times,
+                None => {
+                    own = std::array::from_fn(|i| plan.at.get(assigned.next + i).map_or(f64::INFINITY, |row| row.at(member)));
+                    &own
+                }
+            };
+            let count = times.iter().filter(|time| **time < end).count();
+            self.group.sum_terms(lane, times, &mut states);
+            let (v, y) = states.split_at(plan.v.len());
+            for (rows, block) in [(&mut part.saved_v, v), (&mut part.saved_y, y)] {
+                rows.put(assigned.member, assigned.next * block.len(), count, block.as_flattened(), SIDE);
+            }
+            assigned.next += count;
+            if count < SIDE {
+                break;
+            }
+        }
+        self.sums = states;
+        assigned.next - first
+    }
+
+    /// Saves the states within the steps that lanes have just made, and at their ends.
+    fn save_within(&mut self, part: &mut Part, assignments: &mut [Option<Assignment>]) {
+        let ends = self.group.row(self.places.t).map_or_else(Vec::new, <[f64]>::to_vec);
+        for ((lane, assigned), end) in assignments.iter_mut().enumerate().zip(ends) {
+            let Some(assigned) = assigned else { continue };
+            let member = part.first + assigned.member;
+            if self.plan.at.get(assigned.next).is_some_and(|row| row.at(member) < end) {
+                let saved = self.save_sums(part, lane, assigned, end);
+                self.count_extra(lane, saved + 1); // with the step, as if it had been held
+            }
+            while self.plan.at.get(assigned.next).is_some_and(|row| row.at(member) <= end) {
+                self.save(part, lane, assigned);
+                assigned.next += 1;
+            }
+        }
     }
 
     /// Notes how a member ended.
@@ -585,7 +703,7 @@ impl<'a> Worker<'a> {
             let assigned: Option<&Assignment> = assignments.get(lane)?.as_ref();
             assigned.filter(|assigned| assigned.origin.is_none()).map(|assigned| part.first + assigned.member)
         };
-        let stops = looks.after(&*self.group, member, |member| self.plan.at.last().map_or(f64::NAN, |row| row.at(member)));
+        let stops = looks.after(&*self.group, member, |member| self.last(member));
         for (lane, stop) in stops {
             if let Some(assigned) = &mut assignments[lane] {
                 assigned.stop = Some(stop);

@@ -5,7 +5,7 @@ use ndarray::{ArrayViewMut2, Axis};
 /// Some columns of an array of rows. Its size does not depend on the number of rows, so that a run may save every step.
 pub(crate) struct Columns<'a, T>(ArrayViewMut2<'a, T>);
 
-impl<T> Columns<'_, T> {
+impl<T: Copy> Columns<'_, T> {
     /// How many rows there are.
     pub(crate) fn rows(&self) -> usize {
         self.0.nrows()
@@ -15,6 +15,22 @@ impl<T> Columns<'_, T> {
     pub(crate) fn whole(&mut self, first: usize, rows: usize) -> Option<&mut [T]> {
         let width = self.0.ncols();
         self.0.as_slice_mut()?.get_mut(first * width..(first + rows) * width)
+    }
+
+    /// Puts so many columns of an array of that width into one column, one behind the other from that row on.
+    pub(crate) fn put(&mut self, column: usize, first: usize, count: usize, numbers: &[T], width: usize) {
+        let behind = numbers.len() / width;
+        if behind == 0 {
+            return; // of no rows there are no columns
+        }
+        let mut rows = self.0.index_axis_mut(Axis(1), column);
+        for (i, numbers) in numbers.chunks_exact(width).enumerate() {
+            let mut row = first + i;
+            for number in &numbers[..count] {
+                rows[row] = *number;
+                row += behind;
+            }
+        }
     }
 
     /// Its part of a row.

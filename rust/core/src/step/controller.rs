@@ -22,7 +22,7 @@ macro_rules! numbers {
             $($(#[$of])* pub $number: N,)*
         }
 
-        impl<N: Number> $name<N> {
+        impl<N: Copy> $name<N> {
             /// From its numbers.
             pub fn of([$($number),*]: [N; NUMBERS]) -> Self {
                 $name { $($number),* }
@@ -98,6 +98,13 @@ pub(crate) struct Outlook<N: Number> {
     pub runs: N::Truth,
 }
 
+impl Pace<usize> {
+    /// The places of its numbers, which stand behind so many others.
+    pub(crate) fn places(others: usize) -> Self {
+        Pace::of(std::array::from_fn(|i| others + i))
+    }
+}
+
 impl Pace<f64> {
     /// Whether there is a step of the run to try.
     pub(crate) fn runs(&self, budget: f64) -> bool {
@@ -166,7 +173,7 @@ impl<N: Number> Pace<N> {
     pub const ACCEPTED: usize = 15;
 
     /// Where the next step ends, and whether that is at the wall.
-    fn reach(&self) -> (N, N::Truth) {
+    pub(crate) fn reach(&self) -> (N, N::Truth) {
         let ends = self.wall.below(self.t + self.h);
         (N::choose(ends, self.wall, self.t + self.h), ends)
     }
