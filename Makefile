@@ -262,13 +262,14 @@ $(BIN)/python$(EXE):
 	$(BIN)/python tests/windows/interpreter.py .venv/for-windows $(BUILT_FOR_WINDOWS)/$(WINDOWS)/release/_core.dll
 	@touch $@
 
-# The wheel with the extras that a target asks for. What these need is installed while the wheel is built, if make may do two things.
+# The wheel with the extras that a target asks for. What it and these need is installed while the wheel is built, if make may do two
+# things; the wheel then takes the place of an older one, which has the same version.
 .venv/demo .venv/demo.needs: EXTRA = chart
 .venv/docs .venv/docs.needs: EXTRA = docs
 .venv/test .venv/test.needs: EXTRA = test,docs
 .venv/bench .venv/bench.needs: EXTRA = bench,chart
-NEEDS = import tomllib; extras = tomllib.load(open("pyproject.toml", "rb"))["project"]["optional-dependencies"]; \
-        print(*(need for extra in "$(EXTRA)".split(",") for need in extras[extra]), sep="\n")
+NEEDS = import tomllib; project = tomllib.load(open("pyproject.toml", "rb"))["project"]; extras = project["optional-dependencies"]; \
+        print(*project["dependencies"], *(need for extra in "$(EXTRA)".split(",") for need in extras[extra]), sep="\n")
 
 .venv/demo.needs .venv/docs.needs .venv/test.needs .venv/bench.needs: .venv/maturin pyproject.toml $(PINS)
 	$(BIN)/python -c '$(NEEDS)' > $@.txt
@@ -276,6 +277,5 @@ NEEDS = import tomllib; extras = tomllib.load(open("pyproject.toml", "rb"))["pro
 	@touch $@
 
 .venv/demo .venv/docs .venv/test .venv/bench: .venv/%: .venv/%.needs .venv/wheel
-	$(PIP) "$$(ls dist/*.whl)[$(EXTRA)]"
 	$(PIP) --force-reinstall --no-deps dist/*.whl
 	@touch $@
