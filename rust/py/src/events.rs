@@ -67,6 +67,7 @@ pub(crate) struct EventsOf<'py> {
     begin: PyReadonlyArray1<'py, f64>,
     sign: f64,
     way: f64,
+    jumps: Option<TimesOf<'py>>,
 }
 
 /// A row of one number for all members, or one for each.
@@ -113,6 +114,7 @@ impl EventsOf<'_> {
             begin: row(&self.begin, members)?,
             sign: self.sign,
             way: self.way,
+            jumps: self.jumps.as_ref().map(|jumps| jumps.of_core(members)).transpose()?,
             level: Level::choose().map_err(|unknown| core_error(unknown.into()))?,
             found,
         })

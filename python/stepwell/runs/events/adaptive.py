@@ -301,11 +301,11 @@ class _Resetting(_Driver):
         self._rests = np.full(total, -1)
 
     def sought(self) -> by_core.Sought | None:
-        return by_core.sought(self, self._resets.new_states)
+        return by_core.sought(self, self._resets.new_states, self.jumps)
 
     def goes_in_lanes(self) -> bool:
-        """Where a run goes on, or rates jump, parts begin otherwise than a run does; a control's sum would end at a change."""
-        return self.pacing.begins and self.jumps is None and self.plan.system.control is None
+        """Where a run goes on, parts begin otherwise than a run does; a control's sum would end at a change."""
+        return self.pacing.begins and self.plan.system.control is None
 
     def made(self, sought: by_core.Sought, paces: Array, v: Array, y: Array) -> engine.Adapted | None:
         try:
@@ -329,8 +329,8 @@ class _Resetting(_Driver):
         rows, status = out.paces.reshape(self.numbers, total).copy(), out.status.reshape(total).copy()
         at, index = np.broadcast_to(self.pacing.at.reshape(times, -1), (times, total)), self._going_on(np.arange(total))
 
-        def keep(index: Whole, states: Sequence[Array], last: Sequence[Array]) -> None:
-            later = at[:, index] >= self._start[index]
+        def keep(index: Whole, since: Array, states: Sequence[Array], last: Sequence[Array]) -> None:
+            later = at[:, index] >= since
             for all_saved, all_ends, state, end in zip(saved, ends, states, last, strict=True):
                 where = np.expand_dims(later, tuple(range(1, all_ends.ndim)))
                 all_saved[..., index], all_ends[..., index] = np.where(where, state, all_saved[..., index]), end
@@ -339,7 +339,7 @@ class _Resetting(_Driver):
             self._go_on_anew(index)
             over = ~np.isnan(self.stopped_at[index])
             there = [each[..., index[over]] for each in self.stop_state]
-            keep(index[over], there, there)
+            keep(index[over], self._start[index[over]], there, there)
             rows[engine.TIME, index[over]] = self.stopped_at[index[over]]
             free, wakes = self._let_go(index)
             index, later = index[~over | free], index[wakes]
@@ -347,10 +347,11 @@ class _Resetting(_Driver):
                 index = later
                 continue
             v, y = (each[..., index] for each in self._state)
+            since = self._start[index]  # a part that begins at a jump begins just after it
             plan, pacing, pace = self._begun(index, np.ascontiguousarray(at[:, index]), rows[:, index], v, y)
             self.look(index, pace, v, y, begins=False)
             part = self.stepped(plan, pacing, index, pace, v, y)
-            keep(index, (part.v, part.y), (part.last_v, part.last_y))
+            keep(index, since, (part.v, part.y), (part.last_v, part.last_y))
             rows[:, index], status[index] = part.paces, part.status
             index = np.sort(np.concatenate([self._going_on(index), later]))
         return out._replace(

@@ -65,6 +65,7 @@ class Sought(NamedTuple):
         begin: the times of step 0, one for all or one of each member.
         sign: −1 where the time of the run is negated.
         way: −1 where the time of the run falls.
+        jumps: the jumps of adaptive steps, as known times, both of whose arrays are the same; None without any.
     """
 
     events: list[OfCore]
@@ -75,12 +76,13 @@ class Sought(NamedTuple):
     begin: Array
     sign: float
     way: float
+    jumps: TimesOfCore | None
 
 
-def sought(search: Collected, new_states: dict[int, NewState] | None = None) -> Sought | None:
+def sought(search: Collected, new_states: dict[int, NewState] | None = None, jumps: Array | None = None) -> Sought | None:
     """What the core is to look for; None where a part of it is no tape for numbers of 64 bits, as of many bodies.
 
-    ``new_states`` are those that events give members, by the numbers of these.
+    ``new_states`` are those that events give members, by the numbers of these; ``jumps`` are those of adaptive steps.
     """
     plan = search.plan
     is_plain = bool(search.events) and plan.backend == "rust" and plan.device is None and not (plan.single or plan.fused)
@@ -111,8 +113,12 @@ def sought(search: Collected, new_states: dict[int, NewState] | None = None) -> 
     if both[0] is None or both[1] is None:
         return None
     begin = np.ascontiguousarray(np.broadcast_to(plan.t0, plan.batch).reshape(-1) if np.ndim(plan.t0) else [plan.t0], np.float64)
+    known = None
+    if jumps is not None:
+        rows = jumps.reshape(len(jumps), -1)
+        known = TimesOfCore(*2 * [np.concatenate([rows, np.full((1, rows.shape[1]), np.inf)])])
     n = prod(plan.system.v_shape) + prod(plan.system.y_shape)
-    return Sought(events, both[0], both[1], n, engine.groups_of(plan), begin, search.sign, search.way)
+    return Sought(events, both[0], both[1], n, engine.groups_of(plan), begin, search.sign, search.way, known)
 
 
 def _values(evaluated: Evaluated, numbers: list[Array]) -> Values | None:

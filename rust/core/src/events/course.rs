@@ -178,10 +178,15 @@ impl Watch<'_> {
         let nexts: Vec<Option<f64>> = (0..self.events()).map(|e| self.motion.events.next(e, member, begin)).collect();
         let known = nexts.iter().flatten().copied().fold(f64::INFINITY, f64::min);
         let until = end.min(known);
-        let time = |look: u32| begin + (until - begin) * (f64::from(look) / f64::from(LOOKS));
-        if let Some(first) = (1..=LOOKS).find(|look| !self.holds(memory, e, h, At { member, t: time(*look), state })) {
-            let last = if first > 1 { time(first - 1) } else { begin };
-            let within = time(first) - last;
+        let mut times: Vec<f64> =
+            (1..=LOOKS).map(|look| begin + (until - begin) * (f64::from(look) / f64::from(LOOKS))).collect();
+        if let Some(jumps) = &self.motion.events.jumps {
+            times.extend(jumps.within(member, begin, until).map(f64::next_up));
+            times.sort_by(f64::total_cmp);
+        }
+        if let Some(first) = times.iter().position(|t| !self.holds(memory, e, h, At { member, t: *t, state })) {
+            let last = first.checked_sub(1).map_or(begin, |last| times[last]);
+            let within = times[first] - last;
             let share = self.let_go(memory, e, within, h, At { member, t: last, state });
             (memory.led_back[e], memory.lain[e], memory.rest) = (false, false, None);
             course.start = last + share * within;

@@ -51,6 +51,13 @@ impl Times<'_> {
         (low, at)
     }
 
+    /// The times of a member from one on, and before another.
+    pub(super) fn within(&self, member: usize, from: f64, until: f64) -> impl Iterator<Item = f64> {
+        let column = if self.columns > 1 { member } else { 0 };
+        let all = self.keys.iter().skip(column).step_by(self.columns).copied();
+        all.filter(move |key| *key >= from && *key < until)
+    }
+
     /// The first time of a member after this one, and the sign before it.
     pub(super) fn after(&self, member: usize, key: f64) -> [f64; 2] {
         let (place, at) = self.place(member, key);
@@ -101,6 +108,8 @@ pub struct Events<'a> {
     pub sign: f64,
     /// −1 where the time of the run falls.
     pub way: f64,
+    /// The jumps of adaptive steps, as known times.
+    pub jumps: Option<Times<'a>>,
     /// What hot loops may use.
     pub level: Level,
     /// What was found so far.

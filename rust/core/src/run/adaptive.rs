@@ -372,11 +372,14 @@ impl<'a> Worker<'a> {
             return false;
         }
         let Some(after) = self.behind(member, pace.t) else { return false };
-        let before = &self.plan.jumps[..self.plan.jumps.len() / 2];
-        let wall =
-            |t: f64| before.get(before.partition_point(|row| row.at(member) <= t)).map_or(f64::INFINITY, |row| row.at(member));
-        self.group.set_pace(lane, pace.crossed(after, wall(after), self.group.has_terms()));
+        self.group.set_pace(lane, pace.crossed(after, self.wall(member, after), self.group.has_terms()));
         true
+    }
+
+    /// The next time at which a step of a member from t must end.
+    fn wall(&self, member: usize, t: f64) -> f64 {
+        let before = &self.plan.jumps[..self.plan.jumps.len() / 2];
+        before.get(before.partition_point(|row| row.at(member) <= t)).map_or(f64::INFINITY, |row| row.at(member))
     }
 
     /// The time just after the last jump of a member before which a step may have ended; none without one.
@@ -413,15 +416,13 @@ impl<'a> Worker<'a> {
         let pace = Pace::of(std::array::from_fn(|i| plan.paces[i].at(at)));
         let scales: Vec<f64> = plan.paces[Pace::<f64>::NUMBERS..].iter().map(|row| row.at(at)).collect();
         self.group.set_scales(lane, &scales);
-        let before = &plan.jumps[..plan.jumps.len() / 2];
-        let next = before.get(before.partition_point(|row| row.at(at) <= pace.t));
         self.waypoints.expect_after(pace.accepted);
         if let Some(looks) = &mut self.looks {
             // A held step was looked at before, up to the last time of the run that goes on.
             looks.begin(lane, at, if pace.held > 0.0 { pace.target } else { f64::NEG_INFINITY });
-            looks.begin_course(lane, at, [pace.t, plan.at.last().map_or(f64::NAN, |row| row.at(at))], &state);
+            looks.begin_course(lane, at, plan.at.last().map_or(f64::NAN, |row| row.at(at)), &state);
         }
-        self.group.set_pace(lane, Pace { target: pace.t, wall: next.map_or(f64::INFINITY, |row| row.at(at)), ..pace });
+        self.group.set_pace(lane, Pace { target: pace.t, wall: self.wall(at, pace.t), ..pace });
         Assignment {
             accepted: pace.accepted,
             held_before: pace.held > 0.0,
@@ -735,16 +736,20 @@ impl<'a> Worker<'a> {
             }
         }
         let accepted = (stop.step.number + 1) as f64;
-        let pace = Pace { t: stop.t, accepted, work: f64::NAN, ..self.group.pace(lane) };
+        let mut pace = Pace { t: stop.t, accepted, work: f64::NAN, ..self.group.pace(lane) };
         if stop.goes_on {
+            // Just after a jump at that time.
+            pace.t = self.behind(member, stop.t).map_or(stop.t, |after| after.max(stop.t));
             assigned.next = self.plan.at.iter().position(|at| at.at(member) >= stop.t).unwrap_or(times);
             self.group.set_state(lane, &stop.state);
             self.group.set_pace(lane, pace.again());
             self.group.begin(&self.plan.model.spec, lane, member);
             let mut scales = self.group.scales(lane);
-            let before = self.looks.as_mut().map(|looks| looks.go_on(lane)).unwrap_or_default();
+            let before = self.looks.as_mut().map(|looks| looks.go_on(lane, pace.t)).unwrap_or_default();
             scales.iter_mut().zip(before).for_each(|(size, before)| *size = size.max(before));
             self.group.set_scales(lane, &scales);
+            let begun = self.group.pace(lane);
+            self.group.set_pace(lane, Pace { wall: self.wall(member, pace.t), ..begun });
             return;
         }
         assigned.next = times;

@@ -82,14 +82,17 @@ impl<'a> Looks<'a> {
     }
 
     /// Where events change the state of a lane's member: its run begins in this state, at a time and until another.
-    pub(super) fn begin_course(&mut self, lane: usize, member: usize, times: [f64; 2], state: &[f64]) {
+    pub(super) fn begin_course(&mut self, lane: usize, member: usize, end: f64, state: &[f64]) {
         if self.watch.changes() {
-            self.courses[lane] = Some(self.watch.course(member, times, state));
+            self.courses[lane] = Some(self.watch.course(member, [self.events.begin.at(member), end], state));
         }
     }
 
-    /// The member of a lane goes on in another state. Returns the largest sizes of its groups in the part before.
-    pub(super) fn go_on(&mut self, lane: usize) -> Vec<f64> {
+    /// The member of a lane goes on in another state at this time. Returns the largest sizes of its groups in the part before.
+    pub(super) fn go_on(&mut self, lane: usize, t: f64) -> Vec<f64> {
+        if let Some(course) = &mut self.courses[lane] {
+            course.start = t;
+        }
         (self.fresh[lane], self.since[lane]) = (true, f64::NEG_INFINITY);
         self.longest.iter().skip(lane).step_by(self.t.len()).copied().collect()
     }
