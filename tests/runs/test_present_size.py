@@ -161,7 +161,7 @@ def test_no_method_passes_the_end_of_a_solution() -> None:
 
 @pytest.mark.filterwarnings("ignore::stepwell.StiffnessWarning")
 def test_deviations_at_the_limit_of_stability_are_no_rounding() -> None:
-    """Reactants that fall to 1e-6 erred by 500 000 tolerances. What may be rounding is 2⁻⁴⁰ of the largest, tolerated four times."""
+    """Reactants that fall to 1e-6 erred by 500 000 tolerances. What may be rounding is 2⁻⁴⁰ of the largest, four times over."""
     random = np.random.default_rng(1)
     k, e = 10.0 ** random.uniform(-1.0, 2.5, (3, 300)), 10.0 ** random.uniform(-6.0, -1.0, (3, 300))
     system, true = sw.system(order=1)(lambda t, y, *, k=k[:, 0], e=e[:, 0]: -k * (y - e)), e + (1.0 - e) * np.exp(-20.0 * k)
