@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+import warnings
 from functools import partial
 from typing import Any
 
@@ -346,6 +347,15 @@ def test_fixed_steps_past_the_end_of_a_solution_are_told(method: str) -> None:
     ):
         both = sw.integrate(folded(rate=[0.5, 1.0]), "backward_euler", **start, steps=120)
     assert both.findings[0].members.tolist() == [False, True]
+    with pytest.warns(sw.AccuracyWarning, match="at rate = 0.5: at the end, .* do not hold for 1 of 2 members: member 1"):
+        sw.sweep(folded, {"rate": [0.5, 1.0]}, "backward_euler", **start, transient=20, steps=100)
+    world = sw.World(folded(rate=[0.5, 1.0]), method, y=np.ones((2, 2)), dt=0.01)
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        for _ in range(150):
+            world.step()
+    assert sum("do not hold for 1 of 2 members: member 1" in str(each.message) for each in caught) == (method != "rodas5p")
+    assert {each.filename for each in caught} == {__file__}
 
 
 def test_a_state_that_is_written_into_a_world_has_to_be_consistent() -> None:

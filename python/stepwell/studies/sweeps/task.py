@@ -22,7 +22,7 @@ from ...model.methods import Method
 from ...model.systems import System
 from ...model.systems.base import a_system
 from ...runs import engine
-from ...runs.diagnostics import of_a_strong_control
+from ...runs.diagnostics import lost_equations, of_a_strong_control
 from ...runs.findings import Finding
 from ...runs.making import quietly, step
 from ...runs.negative import Negative, of_a_run
@@ -220,6 +220,10 @@ def run(task: Task, values: dict[str, Any], members: int, stopped: Callable[[], 
     parts.append({"status": status, "first_bad_step": bad})
     grown, amounts = _alone(task, options, last, pieces)
     doubt = last.system.doubt(last.y)
+    if task.at is None and last.system.mass_matrix is not None:
+        end = last.y[-1], last.t[-1]
+        found = lost_equations(last, end, end, np.abs(last.y).max(axis=0), last.status == 0)
+        doubt = found[0][1:] if found else None
     stiff, why = (None, "") if task.at is None else (pieces.stiff(), pieces.why_stopped())
     return Done(together(parts), None if doubt is None else doubt[0], lost(last), grown, stiff, amounts, why)
 
