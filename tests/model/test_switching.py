@@ -142,12 +142,16 @@ def test_solve_ivp_has_the_same_switches(method: str) -> None:
     assert back.sol([5.02, 5.004, 0.0])[0] == pytest.approx([0.01, 0.004, 0.0], rel=1e-9, abs=1e-11)
 
 
-@looped("method", ["rodas5p", "rosenbrock23", "dop853"])
+@looped("method", ["rodas5p", "rosenbrock23", "dop853", "taylor"])
 def test_a_pulse_of_two_ramps_is_met_from_rest(method: str) -> None:
-    """Where both are rounded to 1 the rates are zero, and so are their derivatives."""
-    system = sw.system(order=1)(lambda t, y: np.tanh((t - 5.0) / 0.01) - np.tanh((t - 5.2) / 0.01) + 0.0 * y)
-    run = sw.integrate(system, method, y=0.0, tolerance=1e-4, at=[10.0], max_steps=10_000)
-    assert run.y[-1] == pytest.approx(0.4, rel=1e-3)
+    """Where both are rounded to 1 the rates are zero, and so are their derivatives; then they jump by roundings."""
+    for w, end in ((0.01, 5.2), (0.1, 5.4)):
+        ramps: Any = lambda t, w=w, end=end: np.tanh((t - 5.0) / w) - np.tanh((t - end) / w)  # noqa: E731
+        options: dict[str, Any] = {"y": 0.0, "tolerance": 1e-4, "at": [10.0], "max_steps": 10_000}
+        run = sw.integrate(sw.system(order=1)(lambda t, y: ramps(t) + 0.0 * y), method, **options)  # noqa: B023
+        assert run.y[-1] == pytest.approx(2.0 * (end - 5.0), rel=1e-3)
+        run = sw.integrate(sw.system(lambda t, v, y: ramps(t) + 0.0 * y), method, v=0.0, **options)  # noqa: B023
+        assert run.y[-1] == pytest.approx((end - 5.0) * (15.0 - end), rel=1e-3)
 
 
 @sw.system(order=1)

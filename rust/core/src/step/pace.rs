@@ -70,7 +70,7 @@ const FIRST: f64 = 0.01;
 /// A jump of a force is met by ever shorter steps until one errs by no more than the tolerance of the length that the push would
 /// have made in this part of the time since the start: it must be long beside the roundings of time, and short beside the motion
 /// that follows.
-const PUSHED: f64 = 1.0 / 64.0;
+pub(crate) const PUSHED: f64 = 1.0 / 64.0;
 /// A step in which nothing moves and no stage saw a rate has an estimate of zero that says nothing. The next step is then no
 /// longer than QUIET times the time since the start, or than this one.
 const QUIET: f64 = 1.0 / 32.0;
