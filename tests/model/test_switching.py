@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 import stepwell as sw
-from scipy.special import ive
+from scipy.special import beta, ive
 from stepwell.errors import AccuracyWarning, ToleranceWarning
 from stepwell.model.equations import switching
 from support.looped import looped
@@ -104,6 +104,8 @@ REPEATING: dict[str, tuple[Callable[[Any], Any], float]] = {
     "bell, by a remainder": (lambda t: np.exp(-((((t % 10.0) - 5.0) / 0.01) ** 2)), 50.0 * 0.01 * math.sqrt(math.pi)),
     "von Mises' bell": (lambda t: np.exp(2000.0 * (np.cos(0.2 * np.pi * t) - 1.0)), 500.0 * ive(0, 2000.0)),
     "bell of a sine": (lambda t: np.exp(-1000.0 * np.sin(0.1 * np.pi * t) ** 2), 500.0 * ive(0, 500.0)),
+    "von Mises' bell in full": (lambda t: np.exp(700.0 * np.cos(0.2 * np.pi * t) - 200.0) / np.exp(500.0), 500.0 * ive(0, 700.0)),
+    "power": (lambda t: np.sin(0.2 * np.pi * t) ** 2000, 500.0 * beta(1000.5, 0.5) / np.pi),
     "peak": (lambda t: 1.0 / (1.0 + (np.sin(0.1 * np.pi * t) / 1e-3) ** 2), 500.0 / math.sqrt(1.0 + 1e6)),
     "pulses": (lambda t: np.where(t % 0.05 < 1e-5, 1.0, 0.0), 0.1),
 }
