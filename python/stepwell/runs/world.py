@@ -87,7 +87,8 @@ class World:
     Warns:
         DivergenceWarning: once, if the state is no longer finite.
         AccuracyWarning: once, if the state grew a million times by steps beyond the stability limit, if an amount became
-            negative, which its equations do not reach, or if algebraic equations do not hold any more.
+            negative, which its equations do not reach, if algebraic equations do not hold any more, or if a net gained energy
+            or a quaternion is short by steps alone.
 
     Example:
         >>> v, y = np.zeros(3), np.ones(3)
