@@ -28,18 +28,19 @@ TINY, CALM_ROOTS = 1e-10, (0.5623413251903491, 0.7498942093324558)
 LEAST_PART = 1.0 / (1 << 512)
 #: Rates that are differences of larger numbers are wrong by the rounding of these, of which the controller knows nothing, and no
 #: step makes the error small beside a size that has become less than that. So the error of a group is rounding
+#:
 #: - where a shorter step fails, too, with an error that did not fall by the power 3/2 of the length (that of smooth rates falls
 #:   by 3 and more), while the group changes by less than SLOW times the fourth root of the tolerance, so that it is no motion; or
 #:   by PUSHES times its size and more, for a force that sets in where next to nothing is left looks alike. Where it is no such
-#:   push it is at most what is lost in the largest size so far: beside a pole errors do not fall either (with algebraic
-#:   equations it may be any, see ``small_of``);
-#: - where a group stands, its error being UNLIKE times its change, though that is HOLDS_DOWN of what is tolerated or more, and as
-#:   small as above: at the limit of stability a step of a fast motion leaves its deviation as it is, however large;
+#:   push it is at most ROUNDINGS times what is lost in the largest size so far: beside a pole errors do not fall either
+#:   (with algebraic equations it may be any, see ``small_of``);
+#: - where a group stands, its error being UNLIKE times its change, though that is HOLDS_DOWN of what is tolerated or more (but
+#:   no more than is tolerated or known: at the limit of stability a deviation stands, too, and would grow with what is known);
 #: - where it is no more than ALIKE times what is known of it.
 #:
 #: From then on ROUNDED times such an error in the same time is tolerated, up to the tolerance of the largest size so far. That
 #: fades by FADES a step.
-SLOW, PUSHES, UNLIKE, HOLDS_DOWN, ALIKE, ROUNDED, FADES = 0.75, 1024.0, 8.0, 0.125, 4.0, 4.0, 15.0 / 16.0
+SLOW, PUSHES, UNLIKE, HOLDS_DOWN, ALIKE, ROUNDED, FADES, ROUNDINGS = 0.75, 1024.0, 8.0, 0.125, 4.0, 4.0, 15.0 / 16.0, 2.0
 #: A change of y in a step that is smaller than this, relative to the largest size of y so far, is lost in rounding, with some
 #: margin. So an error of v that moves y by less is tolerated, however small v is: near rest, where forces cancel, v is only
 #: rounding.
@@ -165,7 +166,7 @@ def small_of(mass_matrix: Any, rounding: float = ROUNDING) -> float:
 
     With algebraic equations it may be all of it: what they are off by after a step is an error of the next one, however short.
     """
-    return rounding if mass_matrix is None else 1.0
+    return ROUNDINGS * rounding if mass_matrix is None else 1.0
 
 
 def judged(
@@ -277,8 +278,10 @@ def heard(pace: Pace, following: Pace, step: Any, errors: tuple[Any, Any], sizes
     is_rounding = falls_slowly | (at_most(error, alike * pace.noise) & is_small)
     failed = where(at_most(moved, UNLIKE * error), pace.failed, 0.0)
     noise = where(is_rounding, error * per_time, FADES * pace.noise)
-    stands = at_most(UNLIKE * moved, error) & less(HOLDS_DOWN * bound, error) & less(0.0, pace.lasts) & is_small
-    taken = where(stands, error * per_time, FADES * pace.noise)
+    stands = at_most(UNLIKE * moved, error) & less(HOLDS_DOWN * bound, error) & less(0.0, pace.lasts)
+    most_known, seen = longer(pace.noise, bound * per_time), error * per_time
+    known = longer(FADES * pace.noise, where(less(most_known, seen), most_known, seen))
+    taken = where(stands, known, FADES * pace.noise)
     offends = fails & offends
     noise = where(offends, noise, where(takes, taken, pace.noise))
     return following._replace(noise=noise, failed=where(offends, longer(share, pace.failed), where(takes, failed, pace.failed)))

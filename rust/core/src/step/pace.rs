@@ -36,10 +36,10 @@ pub(crate) const LEAST_PART: f64 = f64::from_bits((1023 - 512) << 52);
 /// - where a shorter step fails, too, with an error that did not fall by the power 3/2 of the length (that of smooth rates falls
 ///   by 3 and more), while the group changes by less than SLOW times the fourth root of the tolerance, so that it is no motion; or
 ///   by PUSHES times its size and more, for a force that sets in where next to nothing is left looks alike. Where it is no such
-///   push it is at most what is lost in the largest size so far: beside a pole errors do not fall either.
+///   push it is at most ROUNDINGS times what is lost in the largest size so far: beside a pole errors do not fall either.
 ///   Not so with algebraic equations: what they are off by after a step is an error of the next one, however short;
-/// - where a group stands, its error being UNLIKE times its change, though that is HOLDS_DOWN of what is tolerated or more, and as
-///   small as above: at the limit of stability a step of a fast motion leaves its deviation as it is, however large;
+/// - where a group stands, its error being UNLIKE times its change, though that is HOLDS_DOWN of what is tolerated or more (but not
+///   more than is tolerated or known: at the limit of stability a deviation stands, too, and would grow with what is known of it);
 /// - where it is no more than ALIKE times what is known of it.
 ///
 /// From then on ROUNDED times such an error in the same time is tolerated, up to the tolerance of the largest size so far. That
@@ -51,6 +51,7 @@ const HOLDS_DOWN: f64 = 0.125;
 const ALIKE: f64 = 4.0;
 const ROUNDED: f64 = 4.0;
 const FADES: f64 = 15.0 / 16.0;
+const ROUNDINGS: f64 = 2.0;
 /// A change of y in a step that is smaller than this, relative to the largest size of y so far, is lost in rounding, with some
 /// margin. So an error of v that moves y by less is tolerated, however small v is: near rest, where forces cancel, v is only
 /// rounding.
@@ -368,7 +369,7 @@ impl<N: Number> Pace<N> {
         let zero = N::of(0.0);
         let (takes, fails) = (self.accepted.below(next.accepted), self.rejected.below(next.rejected));
         let (per_power, per_time, alike) = (N::of(1.0) / (step * step.sqrt()), N::of(ROUNDED) / step, N::of(ALIKE) * step);
-        let small = N::of(if made.has_mass { 1.0 } else { made.rounding });
+        let small = N::of(if made.has_mass { 1.0 } else { ROUNDINGS * made.rounding });
         let of_group = |group: usize| {
             let (noise, failed, error, moved) = (scales.noise[group], scales.failed[group], error[group], made.moved[group]);
             let [relative, _] = scales.tolerances(group, self);
@@ -383,8 +384,10 @@ impl<N: Number> Pace<N> {
             let next_failed = N::choose(moved.at_most(N::of(UNLIKE) * error), failed, zero);
             let next_noise = N::choose(is_rounding, error * per_time, N::of(FADES) * noise);
             let holds_down = N::of(HOLDS_DOWN) * bound[group];
-            let stands = (N::of(UNLIKE) * moved).at_most(error) & holds_down.below(error) & zero.below(self.lasts) & is_small;
-            let taken = N::choose(stands, error * per_time, N::of(FADES) * noise);
+            let stands = (N::of(UNLIKE) * moved).at_most(error) & holds_down.below(error) & zero.below(self.lasts);
+            let (most_known, seen) = (longer(noise, bound[group] * per_time), error * per_time);
+            let known = longer(N::of(FADES) * noise, N::choose(most_known.below(seen), most_known, seen));
+            let taken = N::choose(stands, known, N::of(FADES) * noise);
             let offends = fails & offends;
             let next_noise = N::choose(offends, next_noise, N::choose(takes, taken, noise));
             (next_noise, N::choose(offends, longer(share, failed), N::choose(takes, next_failed, failed)))
