@@ -421,13 +421,13 @@ def radial(s: Any) -> Any:
 
 
 def test_what_algebraic_equations_keep_is_checked_and_projected_onto() -> None:
-    """The length after 100 s is off by half at a tolerance of 1e-3: that is told, and a projection keeps it."""
+    """The length after 100 s is off by a fifth and more at a tolerance of 1e-3: that is told, and a projection keeps it."""
     options: dict[str, Any] = {"y": [1.0, 0.0, 0.0, 0.0, 0.0]}
     loose = options | {"tolerance": 1e-3, "at": [100.0]}
     for method in ABLE:
         with pytest.warns(sw.AccuracyWarning, match=f"has another .* at the end: .*so {method} did not follow the motion"):
             run = sw.integrate(swing, method, **loose)
-        assert abs(np.hypot(*run.y[-1, :2]) - 1.0) > 0.3
+        assert abs(np.hypot(*run.y[-1, :2]) - 1.0) > 0.2
         kept = sw.integrate(swing, method, **loose, control=sw.Projection("length"))
         assert abs(np.hypot(*kept.y[-1, :2]) - 1.0) < 1e-15
         assert not sw.integrate(swing, method, **loose, control=sw.Projection("radial")).findings
