@@ -266,3 +266,12 @@ def test_a_limit_where_derivatives_are_not_finite_is_unknown() -> None:
     assert np.isnan(limits[0])
     with pytest.warns(AccuracyWarning, match=r"the limit of dragged\(\) by rk4 is NaN"):
         assert np.isnan(sw.stability_limit(dragged(), "rk4", y=0.0))
+    with pytest.warns(AccuracyWarning, match=r"by rk4 is NaN"):  # the logarithm does not saturate, though its argument overflows
+        assert np.isnan(sw.stability_limit(sw.system(order=1)(lambda t, y: -y - np.log(1.0 + np.exp(y))), "rk4", y=1000.0))
+
+
+@pytest.mark.filterwarnings("error")
+def test_a_limit_at_which_a_stage_is_not_finite_has_no_warning_of_numpy() -> None:
+    """Beyond it a stage of Hill's rate is a power of what is below zero."""
+    hill = sw.system(order=1)(lambda t, y, *, n=2.5: y**n / (1.0 + y**n) + 0.1 - y)
+    assert sw.stability_limit(hill(), "rk4", y=0.0) == pytest.approx(2.0685708361032193, rel=1e-9)

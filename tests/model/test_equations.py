@@ -333,11 +333,9 @@ WRONG: list[tuple[Any, type[Exception], str]] = [
     (lambda: sw.system(3.0), DTypeError, r"function: expected a Python function"),  # type: ignore[call-overload]
     (lambda: sw.system(order=3), ArgumentError, r"order: expected 1"),
     (lambda: sw.system(order=1, blocks=2), ArgumentError, r"blocks: expected 1 with order=1"),
-    (
-        lambda: run(turning(), y=np.ones(2)),
-        TraceError,
-        r"turning .*: expected real .* a complex one; write the equations",
-    ),
+    (lambda: run(turning(), y=np.ones(2)), TraceError, r"turning .*: expected real .* a complex one; write the equations"),
+    (lambda: run(sw.system(lambda t, y: [1j * y[0]], order=1), y=np.ones(1)), TraceError, "expected real .* a complex one;"),
+    (lambda: run(sw.system(lambda t, y: [y[3]], order=1), y=np.ones(2)), TraceError, "index 3 is out of bounds .* with size 2"),
     (lambda: run(turned(), y=np.ones(2)), TraceError, "expected numbers in an array, got complex; write the equations"),
     (lambda: run(own.pushed(x=lambda t: np.sinc(t)), v=0.0, y=1.0), TraceError, r"pushed: x .*np\.sinc"),
 ]

@@ -236,6 +236,7 @@ ENDING: dict[str, tuple[Rates, float, float, Callable[[float], float]]] = {
     "sigmoid": (lambda x: 1.0 / (1.0 + np.exp(-x)), -1000.0, -1.0, lambda t: 0.0),
     "bell": (lambda x: x / x / np.cosh(x) ** 2 + 1.0, 1000.0, 1.0, lambda t: t),
     "square of a bell": (lambda x: (1.0 / np.cosh(x)) ** 2 + 1.0, -1000.0, 1.0, lambda t: t),
+    "steep bell": (lambda x: 1.0 / np.cosh(900.0 * x) + 1.0, -0.784, 1.0, lambda t: t),  # whose slope alone overflows
     "Gompertz": (lambda x: np.exp(-np.exp(x)) + 1.0, 1000.0, 1.0, lambda t: t),
     "softplus": (
         lambda x: np.logaddexp(0.0, x) - x + np.logaddexp(x, -x) / 1000.0,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+import warnings
 from functools import partial
 from typing import Any
 
@@ -346,6 +347,15 @@ def test_fixed_steps_past_the_end_of_a_solution_are_told(method: str) -> None:
     ):
         both = sw.integrate(folded(rate=[0.5, 1.0]), "backward_euler", **start, steps=120)
     assert both.findings[0].members.tolist() == [False, True]
+    with pytest.warns(sw.AccuracyWarning, match="at rate = 0.5: at the end, .* do not hold for 1 of 2 members: member 1"):
+        sw.sweep(folded, {"rate": [0.5, 1.0]}, "backward_euler", **start, transient=20, steps=100)
+    world = sw.World(folded(rate=[0.5, 1.0]), method, y=np.ones((2, 2)), dt=0.01)
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        for _ in range(150):
+            world.step()
+    assert sum("do not hold for 1 of 2 members: member 1" in str(each.message) for each in caught) == (method != "rodas5p")
+    assert {each.filename for each in caught} == {__file__}
 
 
 def test_a_state_that_is_written_into_a_world_has_to_be_consistent() -> None:
@@ -411,13 +421,13 @@ def radial(s: Any) -> Any:
 
 
 def test_what_algebraic_equations_keep_is_checked_and_projected_onto() -> None:
-    """The length after 100 s is off by half at a tolerance of 1e-3: that is told, and a projection keeps it."""
+    """The length after 100 s is off by a fifth and more at a tolerance of 1e-3: that is told, and a projection keeps it."""
     options: dict[str, Any] = {"y": [1.0, 0.0, 0.0, 0.0, 0.0]}
     loose = options | {"tolerance": 1e-3, "at": [100.0]}
     for method in ABLE:
         with pytest.warns(sw.AccuracyWarning, match=f"has another .* at the end: .*so {method} did not follow the motion"):
             run = sw.integrate(swing, method, **loose)
-        assert abs(np.hypot(*run.y[-1, :2]) - 1.0) > 0.3
+        assert abs(np.hypot(*run.y[-1, :2]) - 1.0) > 0.2
         kept = sw.integrate(swing, method, **loose, control=sw.Projection("length"))
         assert abs(np.hypot(*kept.y[-1, :2]) - 1.0) < 1e-15
         assert not sw.integrate(swing, method, **loose, control=sw.Projection("radial")).findings

@@ -293,3 +293,6 @@ def test_a_quaternion_that_steps_have_damped_away_is_told() -> None:
         assert np.linalg.norm(run.y[-1]) == pytest.approx(length, rel=1e-9)
     kept = sw.integrate(body, "backward_euler", **start, steps=5600, control=sw.Projection("norm"))
     assert not kept.findings
+    world = sw.World(body, "backward_euler", v=np.array([0.0, 0.0, 1.0]), y=np.array([1.0, 0.0, 0.0, 0.0]), dt=10.0 * dt)
+    with pytest.warns(sw.AccuracyWarning, match="a quaternion has the length .* in place of 1"):
+        world.step(1000)

@@ -253,11 +253,18 @@ def test_passes_that_lead_away_are_not_made(stiffness: float) -> None:
 def test_a_net_that_gained_energy_is_named(backend: Any) -> None:
     net, y = rope(1e6)
     start: dict[str, Any] = {"v": 0.0, "y": y, "dt": 1 / 60, "every": 5, "backend": backend}
-    with pytest.warns(
-        sw.AccuracyWarning, match="the run gained energy, .* never give: up to .* from .*, so implicit_midpoint with dt"
-    ):
+    words = "the run gained energy, .* never give: up to .* from .*, so implicit_midpoint with dt"
+    with pytest.warns(sw.AccuracyWarning, match=words):
         sw.integrate(net, "implicit_midpoint", **start, steps=100)
+    calm, wild = (sw.World(net, m, v=0.0 * y, y=y.copy(), dt=1 / 60) for m in ("backward_euler", "implicit_midpoint"))
+    calm.y[-1] += 0.3  # by hand, which adds energy
+    calm.step(300)
+    with pytest.warns(sw.AccuracyWarning, match=words):
+        wild.step(300)
     heights = np.stack([y, y], axis=-1)
     two = sw.Springs(net.pairs, stiffness=[[1e2, 1e6]], rest=net.rest, fixed=[0], gravity=(0.0, -G))
     with pytest.warns(sw.AccuracyWarning, match=r"1 of 2 members gained energy, .*: member 1 has up to"):
         sw.integrate(two, "implicit_midpoint", **start | {"y": heights}, steps=100)
+    made = lambda k=1.0: sw.Springs(net.pairs, stiffness=k * np.ones((1, 1)), rest=net.rest, fixed=[0], gravity=(0.0, -G))  # noqa: E731
+    with pytest.warns(sw.AccuracyWarning, match=r"at k = 100: 1 of 2 members gained energy, .*: member 1 has up to"):
+        sw.sweep(made, {"k": [1e2, 1e6]}, "implicit_midpoint", v=0.0, y=y, dt=1 / 60, steps=100)

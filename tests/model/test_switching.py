@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 import stepwell as sw
-from scipy.special import ive
+from scipy.special import beta, ive
 from stepwell.errors import AccuracyWarning, ToleranceWarning
 from stepwell.model.equations import switching
 from support.looped import looped
@@ -104,6 +104,8 @@ REPEATING: dict[str, tuple[Callable[[Any], Any], float]] = {
     "bell, by a remainder": (lambda t: np.exp(-((((t % 10.0) - 5.0) / 0.01) ** 2)), 50.0 * 0.01 * math.sqrt(math.pi)),
     "von Mises' bell": (lambda t: np.exp(2000.0 * (np.cos(0.2 * np.pi * t) - 1.0)), 500.0 * ive(0, 2000.0)),
     "bell of a sine": (lambda t: np.exp(-1000.0 * np.sin(0.1 * np.pi * t) ** 2), 500.0 * ive(0, 500.0)),
+    "von Mises' bell in full": (lambda t: np.exp(700.0 * np.cos(0.2 * np.pi * t) - 200.0) / np.exp(500.0), 500.0 * ive(0, 700.0)),
+    "power": (lambda t: np.sin(0.2 * np.pi * t) ** 2000, 500.0 * beta(1000.5, 0.5) / np.pi),
     "peak": (lambda t: 1.0 / (1.0 + (np.sin(0.1 * np.pi * t) / 1e-3) ** 2), 500.0 / math.sqrt(1.0 + 1e6)),
     "pulses": (lambda t: np.where(t % 0.05 < 1e-5, 1.0, 0.0), 0.1),
 }
@@ -142,12 +144,16 @@ def test_solve_ivp_has_the_same_switches(method: str) -> None:
     assert back.sol([5.02, 5.004, 0.0])[0] == pytest.approx([0.01, 0.004, 0.0], rel=1e-9, abs=1e-11)
 
 
-@looped("method", ["rodas5p", "rosenbrock23", "dop853"])
+@looped("method", ["rodas5p", "rosenbrock23", "dop853", "taylor"])
 def test_a_pulse_of_two_ramps_is_met_from_rest(method: str) -> None:
-    """Where both are rounded to 1 the rates are zero, and so are their derivatives."""
-    system = sw.system(order=1)(lambda t, y: np.tanh((t - 5.0) / 0.01) - np.tanh((t - 5.2) / 0.01) + 0.0 * y)
-    run = sw.integrate(system, method, y=0.0, tolerance=1e-4, at=[10.0], max_steps=10_000)
-    assert run.y[-1] == pytest.approx(0.4, rel=1e-3)
+    """Where both are rounded to 1 the rates are zero, and so are their derivatives; then they jump by roundings."""
+    for w, end in ((0.01, 5.2), (0.1, 5.4)):
+        ramps: Any = lambda t, w=w, end=end: np.tanh((t - 5.0) / w) - np.tanh((t - end) / w)  # noqa: E731
+        options: dict[str, Any] = {"y": 0.0, "tolerance": 1e-4, "at": [10.0], "max_steps": 10_000}
+        run = sw.integrate(sw.system(order=1)(lambda t, y: ramps(t) + 0.0 * y), method, **options)  # noqa: B023
+        assert run.y[-1] == pytest.approx(2.0 * (end - 5.0), rel=1e-3)
+        run = sw.integrate(sw.system(lambda t, v, y: ramps(t) + 0.0 * y), method, v=0.0, **options)  # noqa: B023
+        assert run.y[-1] == pytest.approx((end - 5.0) * (15.0 - end), rel=1e-3)
 
 
 @sw.system(order=1)

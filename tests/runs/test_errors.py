@@ -91,6 +91,7 @@ BAD: dict[type[Exception], list[tuple[Callable[[], Any], str]]] = {
         (lambda: sw.orbits.system([1.0, 1e-3], P=1.0), "P: system has no such argument; the time of a revolution is period="),
         (lambda: run(method="fals_euler"), "method: there is no 'fals_euler'; did you mean 'false_euler'? Known: "),
         (lambda: run(method="gillespie"), "method: gillespie is for stochastic simulation, which is not here"),
+        (lambda: run(method="Boris"), "method: Boris is not here; leapfrog and pefrl are symplectic where"),
         (lambda: run(method="IAS15"), "method: IAS15 is REBOUND's, and not here; take taylor or dop853 with tolerance="),
         (lambda: run(method="kutta3"), "method: kutta3 is not here; write it as a function, stepwell.method"),
         (lambda: sw.World(turning, "rk4", v=np.zeros(1), y=np.ones(1), dt=0.1).set(k=1.0), "there is no 'k'. Known: none."),
@@ -210,6 +211,7 @@ BAD: dict[type[Exception], list[tuple[Callable[[], Any], str]]] = {
         ),
         (lambda: sw.stability_limit("rk4", sw.Oscillator()), "method: expected the name of a method, got Oscillator"),  # type: ignore[arg-type]
         (lambda: sw.sweep(sw.Oscillator, "rk4", {"omega": ("w", [1.0])}), "axes stand before the method"),  # type: ignore[arg-type]
+        (lambda: sw.sweep({"omega": ("w", [1.0])}, sw.Oscillator, "rk4"), "axes stand behind the system"),  # type: ignore[arg-type]
         # As a list it was one for each member, as a tuple a pair.
         *(
             (lambda wrong=wrong: paced(tolerance=wrong), "tolerance: expected a number, an array, or a tuple (relative")

@@ -285,6 +285,14 @@ def test_the_picture_has_lines_numbers_and_hatching(method, tmp_path):
     assert faults(figure) == []
 
 
+def test_the_picture_of_an_own_method_names_no_section():
+    @sw.method
+    def own(s, t, h, v, y):
+        return v + s.dv(t, v, y), y + s.dy(t, v, y)
+
+    assert sw.charts.stability_map(own, size=8).plot().texts[1].get_text().startswith("Damped oscillator")
+
+
 def test_lines_of_maps_are_at_the_limits_and_may_be_missing(false_euler, tmp_path):
     thick = next(c for c in false_euler.plot().axes[0].collections if max(np.atleast_1d(c.get_linewidth())) > 2)
     for path in thick.get_paths():

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from functools import lru_cache
+from types import SimpleNamespace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,7 +17,7 @@ from ..base.reprs import first_of, share
 from ..errors import AccuracyWarning, DivergenceWarning, UnsupportedError
 from ..model.compatibility import TURNING
 from ..model.methods import Method
-from ..model.systems import NBody, System
+from ..model.systems import NBody, Springs, System
 from ..runs.findings import Finding, at_places, may_have_amounts, warn_of
 
 #: A state is looked at once it is this many times as long as at the start; from rest, once it is this many units long.
@@ -310,6 +311,15 @@ def watched(
         grown = growth(system, method, dt, loop.step_number - first, t0, start, (v, y))
         if grown is not None:
             warn_of([grown.finding(v.shape[len(system.v_shape) :])], 3)
+            return ENDLESS
+        about = system.doubt(y[np.newaxis])
+        if isinstance(system, Springs) and system.keeper is None and about is None:
+            from ..runs import known_energy  # only such worlds need it
+
+            of = SimpleNamespace(system=system, method=method, dt=dt)
+            about = known_energy.gain(of, list(zip(start, (v, y), strict=True)), known_energy.GAINED)
+        if about is not None:
+            warn_of([Finding(AccuracyWarning, *about)], 3)
             return ENDLESS
         every *= 2
         return every if every <= LAST_CHECK else ENDLESS

@@ -67,6 +67,10 @@ NOT_HERE = {
     r"ias_?\d*|mercurius": (
         "REBOUND's, and not here; take taylor or dop853 with tolerance= and at=, or wisdom_holman for planets around a star."
     ),
+    r"boris.*|.*higuera.*|numerov.*|symplectic": (
+        "not here; leapfrog and pefrl are symplectic where forces do not depend on the velocity; implicit_midpoint keeps "
+        "what turns, as in a magnetic field."
+    ),
     r"gillespie.*|ssa|tau_leap.*|.*next_reaction.*": (
         "for stochastic simulation, which is not here; the methods step mean rates."
     ),

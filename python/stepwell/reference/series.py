@@ -310,9 +310,9 @@ def _convolved(a: Sequence[Term], b: Sequence[Term], k: int) -> Term:
 
 
 def _finite_term(x: Series, k: int) -> Term:
-    """A coefficient above order 0 of a divisor, or of what a function depends on: what is infinite counts as constant."""
+    """A coefficient above order 0 of a divisor, or of what a function depends on, where it is finite, else 0."""
     term = x.terms[k]
-    return where(magnitude(x.terms[0]) < np.inf, term, 0.0) if x.book.ends and term is not None else term
+    return where(magnitude(term) < np.inf, term, 0.0) if x.book.ends and term is not None else term
 
 
 def _quotient(start: Any, dividend: Callable[[int], Term], divisor: Series, sign: int = 0) -> Series:

@@ -26,6 +26,7 @@ from .adaptive import (
     LEAST_PART,
     MAX_FACTOR,
     ONSET,
+    PUSHED,
     ROUNDING,
     Attempted,
     Pace,
@@ -110,7 +111,11 @@ def attempt(
     defect = sizes(slope_v - unit * rate_v, slope_y - unit * rate_y, block_axes, groups)
     # Rates that change in a step by their own size change by this in some roundings of the time.
     rounded = sizes(slope_v, slope_y, block_axes, groups) * (TIME_ROUNDING * longer(end, -end) * (1.0 / unit))
-    agrees = functools.reduce(operator.and_, at_most(share * defect, allowed + rounded))
+    # What rests so far counts as long as the rates at the end would have made it in a part of the time since the start.
+    rests = at_most(total(pace.longest), 0.0) & less(0.0, pace.lasts)
+    since = where(rests, DEFECT * (order + 1.0) * PUSHED * (end - pace.begin), 0.0)
+    pushed = sizes(rate_v, rate_y, block_axes, groups) * (since * pace.tolerances()[0])
+    agrees = functools.reduce(operator.and_, at_most(share * defect, (allowed + rounded) + pushed))
     stays: Any = None
     v1, y1, work = system.project(v1, y1)
     if branches:
@@ -185,7 +190,8 @@ def reach(
         sizes(*blocks, block_axes, groups) for blocks in ((v, y), *terms[:2], *terms[order - 2 :])
     )
     relative, absolute = pace.tolerances()
-    # A group at zero counts as long as its rate would have made it in the last step, and as a part of the others of its block.
+    # A group at zero counts as long as its rate would have made it in the last step, or the rate of that, and as a part of the
+    # others of its block.
     standing = []
     for block in (slice(0, counts[0]), slice(counts[0], sum(counts))):
         longest, now = pace.longest[block], present[block]
@@ -193,7 +199,9 @@ def reach(
         for size in longest:
             standing.append(where(less(0.0, size), LEAST_PART * size, onset) if len(now) > 1 else LEAST_PART * size)
     counts_as = longer(where(less(0.0, pace.lasts), stacked(standing), 0.0), present)
-    counts_as = longer(counts_as, first * (pace.before * (1.0 / unit)))
+    part = pace.before * (1.0 / unit)
+    counts_as = longer(counts_as, first * part)
+    counts_as = where(less(0.0, counts_as), counts_as, second * (part * part))
 
     def bound_of(size: Any) -> Any:
         # What begins at zero, where nothing else has been, tolerates no error: it does not count.

@@ -52,6 +52,7 @@ STOPPED = 256
 STATES = 32
 
 State = tuple[Array, Array]
+Moment = tuple[Array, Any]
 #: A message, and the members that it is about.
 About = tuple[str, Any]
 
@@ -110,19 +111,23 @@ def findings_of(
 
 
 def _of_algebraic_equations(run: Run, request: Request) -> list[Finding]:
-    """The members that lost their algebraic equations: fixed steps go on where these have no solution, or determine none."""
+    """The members of a run of fixed steps that lost their algebraic equations."""
     start = np.broadcast_to(request.y, run.y.shape[1:])
     sizes = np.maximum(np.abs(run.y).max(axis=0), np.abs(start))
-    states = (start, run.t0), (run.y[-1], run.t[-1])
-    broken, crossed = (each & (run.status == 0) for each in registry.task("algebraic_lost")(run.system, *states, sizes))
+    return lost_equations(run, (start, run.t0), (run.y[-1], run.t[-1]), sizes, run.status == 0)
+
+
+def lost_equations(of: Run | engine.Plan, start: Moment, end: Moment, sizes: Array, goes_on: Any) -> list[Finding]:
+    """The members that lost their algebraic equations: fixed steps go on where these have no solution, or determine none."""
+    broken, crossed = (each & goes_on for each in registry.task("algebraic_lost")(of.system, start, end, sizes))
     lost = broken.any()
     if not (wrong := broken if lost else crossed).any():
         return []
     some, first = int(wrong.sum()), tuple(np.argwhere(wrong)[0].tolist())
     who = f"{share(some, wrong.shape, wrong.size)}{first_of(some, first, wrong.size)}"
-    steps = f"steps of {run.dt:g} by {run.method.name}"
+    steps = f"steps of {of.dt:g} by {of.method.name}"
     text = (
-        f"at the end, t = {run.t[-1]:g}, the algebraic equations do not hold for {who}; they have no solution there, or {steps} "
+        f"at the end, t = {end[1]:g}, the algebraic equations do not hold for {who}; they have no solution there, or {steps} "
         f"lost it: take tolerance=, which stops there, or shorter steps"
     )
     if not lost:

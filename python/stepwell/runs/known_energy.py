@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from math import pi, prod
 from typing import Any, NamedTuple
 
@@ -38,6 +38,8 @@ FEW_EVALUATIONS, MOST_NUMBERS = 100, 100_000
 #: Changes below LITTLE of its own size are not checked, which takes a hundred microseconds: they would count only if a constant
 #: of a thousand times what is exchanged was added.
 CHANGED, CHANGED_OF_SLOPE, LITTLE = 0.5, 0.25, 2.0**-10
+#: The same of a world, over what moved at the start: what is written into its arrays may add energy, too, but not so much.
+GAINED = 1e4
 #: The share in place of CHANGED of what algebraic equations keep: they have lost the constraint of which they are the derivative.
 DRIFTED = 0.1
 #: The steps of a way on which such an invariant is looked at.
@@ -82,16 +84,23 @@ def may_gain(system: System, method: Method, steps: int) -> bool:
 
 
 def gain_of(run: Run, start: State) -> About | None:
-    """Members of a run of a net that gained energy in fixed steps; surfaces, damping and drag only take it."""
-    system = run.system
-    v0, y0 = (np.broadcast_to(block, run.y.shape[1:]) for block in start)
-    assert isinstance(system, Springs)
-    if run.force is not None or system.given_inputs() or not run.status.size or v0[system.fixed].any():
-        return None
-    if run.y[-1].size > MOST_NUMBERS:
+    """Members of a run of a net that gained energy in fixed steps."""
+    if run.force is not None or not run.status.size or run.y[-1].size > MOST_NUMBERS:
         return None
     saved = slice(-1, None) if run.y.size > MOST_NUMBERS else slice(None)
-    v, y = (np.moveaxis(np.concatenate([a[None], b[saved]]), 0, 2) for a, b in ((v0, run.v), (y0, run.y)))
+    return gain(run, [(np.broadcast_to(b, a.shape[1:]), *a[saved]) for a, b in zip((run.v, run.y), start, strict=True)], CHANGED)
+
+
+def gain(of: Any, blocks: Sequence[Sequence[Array]], least: float) -> About | None:
+    """Members of a net that gained energy in fixed steps; surfaces, damping and drag only take it.
+
+    ``of`` has their system, method and dt; ``blocks`` are v and y of some states, the first of them that of the start; ``least``
+    is the least gain that counts, over the energies that there were.
+    """
+    system: Springs = of.system
+    v, y = (np.stack(block, axis=2) for block in blocks)
+    if system.given_inputs() or v[system.fixed, :, 0].any():
+        return None
     with np.errstate(all="ignore"):
         alone = system.reference_at_step(1.0, y.shape[2:])
         _, kinetic, energy = alone.energies(v, y)
@@ -100,14 +109,15 @@ def gain_of(run: Run, start: State) -> About | None:
         pull = 0.0 if alone.fall is None else (weight * np.sqrt((alone.fall * alone.fall).sum(axis=0)))[0]
         stretched = (0.5 * alone.stiffness * alone.stretches(y[:, :, :1]) ** 2).sum(axis=0)[0]
         first, most = energy[0], energy.max(axis=0)
-        wrong = (most - first > CHANGED * np.maximum(kinetic.max(axis=0), stretched + pull * moved)) & (run.status == 0)
+        known = kinetic.max(axis=0) if least < 1.0 else kinetic[0]
+        wrong = np.asarray((most - first > least * np.maximum(known, stretched + pull * moved)) & np.isfinite(most))
     if not wrong.any():
         return None
     index, some = tuple(np.argwhere(wrong)[0].tolist()), int(np.count_nonzero(wrong))
     text = (
         f"{share(some, wrong.shape, wrong.size)} gained energy, which springs and surfaces never give: "
         f"{f'{in_words(index)} has ' if wrong.size > 1 else ''}up to {most[index]:.3g} from {first[index]:.3g}, so "
-        f"{run.method.name} with dt = {run.dt:g} did not follow the motion; take shorter steps"
+        f"{of.method.name} with dt = {of.dt:g} did not follow the motion; take shorter steps"
     )
     return text, wrong
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from math import prod
+from math import inf, prod
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -32,6 +32,8 @@ if TYPE_CHECKING:
 #: By this share of each number algebraic equations may be off in a state that was written, where those of other members are as
 #: the steps left them.
 MOST_WRITTEN = 1e-3
+#: Whether algebraic equations hold takes as long as many short steps: it is asked after calls 1, 3, 7, …, and each of so many.
+LOOKS = 64
 
 
 class World:
@@ -84,8 +86,9 @@ class World:
 
     Warns:
         DivergenceWarning: once, if the state is no longer finite.
-        AccuracyWarning: once, if the state grew a million times by steps beyond the stability limit, or if an amount became
-            negative, which its equations do not reach.
+        AccuracyWarning: once, if the state grew a million times by steps beyond the stability limit, if an amount became
+            negative, which its equations do not reach, if algebraic equations do not hold any more, or if a net gained energy
+            or a quaternion is short by steps alone.
 
     Example:
         >>> v, y = np.zeros(3), np.ones(3)
@@ -156,13 +159,23 @@ class World:
 
     def _holding(self, make: Callable[..., bool], y: Array) -> Callable[..., bool]:
         """``make`` for a system with algebraic equations, which have to hold in a state that was written between its calls."""
-        left = y.copy()
+        left, waits, pause = y.copy(), 0.0, 1
 
         def step(n: int = 1) -> bool:
             """Make n steps in place, and return whether the state is no longer finite."""
+            nonlocal waits, pause
             if not np.array_equal(left, y, equal_nan=True):
                 registry.task("algebraic_start")(self.system, y, self.t, MOST_WRITTEN, 0.0)
+            before, waits = self.t, waits - 1
             diverged = make(n)
+            if waits <= 0 and not diverged:
+                from .diagnostics import lost_equations
+
+                waits = pause = min(2 * pause, LOOKS)
+                sizes = np.maximum(np.abs(left), np.abs(y))
+                if found := lost_equations(self._plan, (left, before), (y, self.t), sizes, True):
+                    waits = inf
+                    warn_of(found, 3)
             left[...] = y
             return diverged
 

@@ -162,6 +162,7 @@ def _of_all(
     return tuple(each.reshape(members) for each in (limits, grows, modes))  # type: ignore[return-value]
 
 
+@np.errstate(invalid="ignore")  # a stage may be infinite at the limit, as of a power below zero
 def _of_some(search: Search) -> tuple[Array, Array, Any]:
     """The limits, the smallest steps known to grow, and the modes of the members of a search."""
     if search.v is None and len(search.rates) > 2:

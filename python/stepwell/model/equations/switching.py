@@ -7,8 +7,8 @@ it is solved for the time by inverting the operations one after the other, from 
 must stand once in a comparison, or once in each of some factors whose product is compared with zero.
 
 Steps would miss a narrow bell or ramp, too, though it is smooth. It has a middle, at which the argument of an even power, an
-exponential or the like is zero. A step that ends there does not miss it. Bells that repeat count if they are narrow: steps that
-end at each turn of a wave would be for nothing.
+exponential or the like is zero, or a wave turns. A step that ends there does not miss it. Bells that repeat count if they are
+narrow: steps that end at each turn of a wave would be for nothing.
 """
 
 from __future__ import annotations
@@ -89,6 +89,8 @@ KINKS: dict[str, Callable[..., list[Switch]]] = {
 }
 #: Functions that make a bell or a ramp whose middle is where their first argument is zero.
 WITH_MIDDLE = {"exp", "exp2", "expm1", "tanh", "cosh", "arctan", "hypot", "power"}
+#: Where functions that swing are largest and smallest, within a period of 2π: there a power or the like of them may be a bell.
+EXTREMES = {"sin": (0.5 * np.pi, -0.5 * np.pi), "cos": (0.0, np.pi)}
 #: Periodic functions, of which bells and ramps repeat.
 REPEATING = {"sin", "cos", "tan", "mod", "remainder"}
 
@@ -209,6 +211,7 @@ class Switches:
         """The switches at which a line has a kink, or the middle of a bell or a ramp."""
         if (mark := self.functions.get(line)) is not None:
             middle = [Switch(mark.arguments[0], 0.0, smooth=True)] if mark.name in WITH_MIDDLE else []
+            middle += [Switch(mark.arguments[0], each, 2.0 * np.pi, smooth=True) for each in EXTREMES.get(mark.name, ())]
             return KINKS[mark.name](*mark.arguments) if mark.name in KINKS else middle
         base, exponent = self.powers[line]
         return [Switch(base, 0.0, smooth=True)] if exponent % 2 == 0 else []
@@ -222,7 +225,8 @@ class Switches:
         return once and bool(switch.shapes or not self._repeated(switch))
 
     def _repeated(self, switch: Switch) -> bool:
-        return switch.smooth and any(self.repeats[each] for each in switch[:2] if isinstance(each, Line))
+        repeats = switch.period is not None or any(self.repeats[each] for each in switch[:2] if isinstance(each, Line))
+        return switch.smooth and repeats
 
     def _shapes(self, rates: MarkedReplay) -> dict[int, tuple[int, ...]]:
         """By lines of the time, those that are the last ones of the time alone, behind a function with a middle or a quotient."""
@@ -242,7 +246,8 @@ class Switches:
             shapes[line] = {line} if is_last else set()
             shapes[line].update(*(shapes.get(each, ()) for each in behind))
             mark = self.functions.get(line)
-            own = self.tape[line].name == "divide" if mark is None else mark.name in WITH_MIDDLE
+            bends_alone = self.tape[line].name == "divide" or self.powers[line][1] > 2
+            own = bends_alone if mark is None else mark.name in WITH_MIDDLE
             bends[line] = own or any(bends.get(each, False) for each in behind)
         bent = {line for line in shapes if any(bends.get(each, False) for each in (line, *readers.get(line, [])))}
         return {line: tuple(sorted(shapes[line])) for line in bent}
@@ -294,7 +299,8 @@ class Solving:
         while waiting:
             line, values = waiting.pop()
             if self.tape[line].name == "time":
-                yield self._narrow(values, shapes) if shapes else values if smooth else self._exact(values, switch)
+                narrow = self._narrow(values, shapes, period is not None) if shapes else values
+                yield narrow if smooth else self._exact(values, switch)
             else:
                 operands = list(self._inverted(line, values))
                 self.unsolved |= not (smooth or operands)
@@ -352,8 +358,8 @@ class Solving:
         periodic = values + period * every
         return periodic.reshape(-1, *periodic.shape[2:])
 
-    def _narrow(self, times: Array, shapes: Sequence[int]) -> Array:
-        """These middles of bells or ramps that repeat, where they are narrow, else NaN."""
+    def _narrow(self, times: Array, shapes: Sequence[int], bells: bool) -> Array:
+        """These middles of bells or ramps that repeat, or with ``bells`` of bells alone, where they are narrow, else NaN."""
         ordered = np.sort(times, axis=0)
         apart = np.diff(ordered, axis=0)
         apart[~(apart > HEIGHT * np.nanmax(apart, axis=0, initial=0.0))] = np.inf
@@ -367,7 +373,7 @@ class Solving:
             values = self._at(line, middle + period * around)
             height = HEIGHT * (values.max(axis=0) - values.min(axis=0))
             away = np.abs(values - np.median(values, axis=0)) > height
-            narrow |= (away.mean(axis=0) < NARROW) & (height > 0.0)
+            narrow = narrow | (away.mean(axis=0) < NARROW) & (height > 0.0) & (away[SHAPE_SAMPLES // 2] | (not bells))
         return np.where(narrow, times, np.nan) if narrow.any() else times[:0]
 
     def _exact(self, times: Array, switch: Switch) -> Array:

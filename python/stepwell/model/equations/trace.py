@@ -33,7 +33,6 @@ if TYPE_CHECKING:
 
 #: The most frames of a traceback that are searched for the user's function.
 MOST_FRAMES = 200
-
 #: The most characters of a line of the user's file in a message.
 MOST_OF_A_LINE = 80
 
@@ -290,7 +289,8 @@ def _located(error: Exception, function: Any, name: str) -> TraceError:
             f"parameter: sw.Sampled(values, interval, interpolation='linear' or 'cubic')"
         )
     located = TraceError(f"{name}{line}: {text}")
-    located.of_shape = known.of_shape if isinstance(known, TraceError) else isinstance(error, (IndexError, TypeError, ValueError))
+    may_be = isinstance(error, (IndexError, TypeError, ValueError)) and not text.endswith(checks.COMPLEX)
+    located.of_shape = known.of_shape if isinstance(known, TraceError) else may_be
     return located
 
 

@@ -184,8 +184,8 @@ class OwnSystem(System):
         for error in refused:
             if not error.of_shape:
                 return error
-        if not (hint := self._batch_first(shapes)):
-            return refused[0]
+        if not (hint := self._batch_first(shapes)):  # that a number does not do says nothing where there is an array
+            return next((error for error in refused if not str(error).endswith("got one number")), refused[0])
         hinted = ShapeError(f"{name}: {hint}")
         hinted.__cause__ = refused[-1]
         return hinted

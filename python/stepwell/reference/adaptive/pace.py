@@ -34,12 +34,13 @@ LEAST_PART = 1.0 / (1 << 512)
 #:   by PUSHES times its size and more, for a force that sets in where next to nothing is left looks alike. Where it is no such
 #:   push it is at most ROUNDINGS times what is lost in the largest size so far: beside a pole errors do not fall either
 #:   (with algebraic equations it may be any, see ``small_of``);
-#: - where a group stands, its error being UNLIKE times its change, though that is HOLDS_DOWN of what is tolerated or more;
+#: - where a group stands, its error being UNLIKE times its change, though that is HOLDS_DOWN of what is tolerated or more (but
+#:   no more than is tolerated or known: at the limit of stability a deviation stands, too, and would grow with what is known);
 #: - where it is no more than ALIKE times what is known of it.
 #:
 #: From then on ROUNDED times such an error in the same time is tolerated, up to the tolerance of the largest size so far. That
 #: fades by FADES a step.
-SLOW, PUSHES, UNLIKE, HOLDS_DOWN, ALIKE, ROUNDED, FADES, ROUNDINGS = 0.75, 1024.0, 8.0, 0.125, 4.0, 4.0, 15.0 / 16.0, 64.0
+SLOW, PUSHES, UNLIKE, HOLDS_DOWN, ALIKE, ROUNDED, FADES, ROUNDINGS = 0.75, 1024.0, 8.0, 0.125, 4.0, 4.0, 15.0 / 16.0, 2.0
 #: A change of y in a step that is smaller than this, relative to the largest size of y so far, is lost in rounding, with some
 #: margin. So an error of v that moves y by less is tolerated, however small v is: near rest, where forces cancel, v is only
 #: rounding.
@@ -278,7 +279,9 @@ def heard(pace: Pace, following: Pace, step: Any, errors: tuple[Any, Any], sizes
     failed = where(at_most(moved, UNLIKE * error), pace.failed, 0.0)
     noise = where(is_rounding, error * per_time, FADES * pace.noise)
     stands = at_most(UNLIKE * moved, error) & less(HOLDS_DOWN * bound, error) & less(0.0, pace.lasts)
-    taken = where(stands, error * per_time, FADES * pace.noise)
+    most_known, seen = longer(pace.noise, bound * per_time), error * per_time
+    known = longer(FADES * pace.noise, where(less(most_known, seen), most_known, seen))
+    taken = where(stands, known, FADES * pace.noise)
     offends = fails & offends
     noise = where(offends, noise, where(takes, taken, pace.noise))
     return following._replace(noise=noise, failed=where(offends, longer(share, pace.failed), where(takes, failed, pace.failed)))

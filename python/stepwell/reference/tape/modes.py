@@ -124,8 +124,10 @@ def _factors(listing: Listing, line: int, wanted: list[bool]) -> tuple[Any, ...]
     return factors(listing.operations[line].name, list(reads), listing.symbols[line])
 
 
-#: Functions that overflow, and the operands of others that saturate: which of them, of all operations that are no functions.
+#: Functions that overflow, and the operands of others that saturate: which of them, of all operations that are no functions. All
+#: those of functions may, but for these.
 _OVERFLOWING, _SATURATING = {"exp", "exp2", "expm1", "sinh", "cosh", "power"}, {"divide": (1,), "multiply": (0, 1)}
+_SATURATING |= dict.fromkeys(("log", "log2", "log10", "log1p", "cbrt"), ())
 
 
 def _saturating(listing: Listing) -> list[Sequence[int]]:
@@ -133,8 +135,8 @@ def _saturating(listing: Listing) -> list[Sequence[int]]:
     if not any(mark.name in _OVERFLOWING for mark in listing.marks.values()):
         return [()] * len(listing.operations)
     return [
-        range(len(listing.marks[line].arguments)) if line in listing.marks else _SATURATING.get(operation.name, ())
-        for line, operation in enumerate(listing.operations)
+        _SATURATING.get(mark.name, range(len(mark.arguments))) if mark else _SATURATING.get(operation.name, ())
+        for mark, operation in zip(map(listing.marks.get, range(len(listing.operations))), listing.operations, strict=True)
     ]
 
 

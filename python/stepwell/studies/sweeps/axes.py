@@ -12,6 +12,7 @@ from ...base import checks
 from ...base.arrays import Array, Shape
 from ...errors import ArgumentError, DTypeError, ShapeError
 from ...model.methods import Method
+from ...model.systems import System
 
 #: Arguments of ``integrate`` that can be axes. All other names are those of parameters of the system.
 OF_THE_RUN = ("v", "y", "dt", "force", "tolerance")
@@ -154,6 +155,8 @@ def grid(axes: Any) -> Grid:
     """
     if not isinstance(axes, Mapping):
         order = "; axes stand before the method, sweep(system, axes, method)" if isinstance(axes, (str, Method)) else ""
+        if callable(axes) or isinstance(axes, System):
+            order = "; axes stand behind the system, sweep(system, axes, method)"
         raise DTypeError(
             "axes: expected a dictionary of arguments by name, such as {'mu': ('mu', values)}, got "
             f"{type(axes).__name__}{order}"

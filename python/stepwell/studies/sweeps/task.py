@@ -21,8 +21,8 @@ from ...model.compatibility import velocities
 from ...model.methods import Method
 from ...model.systems import System
 from ...model.systems.base import a_system
-from ...runs import engine
-from ...runs.diagnostics import of_a_strong_control
+from ...runs import engine, known_energy
+from ...runs.diagnostics import lost_equations, of_a_strong_control
 from ...runs.findings import Finding
 from ...runs.making import quietly, step
 from ...runs.negative import Negative, of_a_run
@@ -218,23 +218,28 @@ def run(task: Task, values: dict[str, Any], members: int, stopped: Callable[[], 
     about = "first step that was not finite, or −1" if task.at is None else "step at which the member stopped, or −1"
     bad = Variable((), np.array(last.first_bad_step, dtype=np.int64), about)
     parts.append({"status": status, "first_bad_step": bad})
-    grown, amounts = _alone(task, options, last, pieces)
-    doubt = last.system.doubt(last.y)
+    grown, amounts, gained = _alone(task, options, last, pieces)
+    doubt = last.system.doubt(last.y) or gained
+    if task.at is None and last.system.mass_matrix is not None:
+        end = last.y[-1], last.t[-1]
+        found = lost_equations(last, end, end, np.abs(last.y).max(axis=0), last.status == 0)
+        doubt = found[0][1:] if found else None
     stiff, why = (None, "") if task.at is None else (pieces.stiff(), pieces.why_stopped())
     return Done(together(parts), None if doubt is None else doubt[0], lost(last), grown, stiff, amounts, why)
 
 
-def _alone(task: Task, options: dict[str, Any], last: Run, pieces: Pieces) -> tuple[Growth | None, Negative | None]:
-    """The members that by their steps alone grew, and that became negative, from the start of the sweep to its end."""
+def _alone(task: Task, options: dict[str, Any], last: Run, pieces: Pieces) -> tuple[Growth | None, Negative | None, Any]:
+    """The members that by steps alone grew, became negative, and gained energy, from the start of the sweep to its end."""
     if any(event.then for event in options.get("events", ())):
-        return None, None  # events may change states, so these say nothing about the steps
+        return None, None, None  # events may change states, so these say nothing about the steps
     system, batch = last.system, last.status.shape
     blocks = (("v", velocities(system, options.get("v")), system.v_shape), ("y", options["y"], system.y_shape))
     v, y = (spread(checks.block(name, block, shape, system.axes), shape, batch) for name, block, shape in blocks)
     if task.at is not None:
-        return None, of_a_run(last, y, pieces.plan)
-    grown = _growth.of_last_piece(last, (v, y), task.transient + task.steps)
-    return grown, of_a_run(last, y) if grown is None else None
+        return None, of_a_run(last, y, pieces.plan), None
+    steps = task.transient + task.steps
+    grown, gains = _growth.of_last_piece(last, (v, y), steps), known_energy.may_gain(system, task.method, steps)
+    return grown, of_a_run(last, y) if grown is None else None, known_energy.gain_of(last, (v, y)) if gains else None
 
 
 def _reduced(

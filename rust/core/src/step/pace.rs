@@ -38,7 +38,8 @@ pub(crate) const LEAST_PART: f64 = f64::from_bits((1023 - 512) << 52);
 ///   by PUSHES times its size and more, for a force that sets in where next to nothing is left looks alike. Where it is no such
 ///   push it is at most ROUNDINGS times what is lost in the largest size so far: beside a pole errors do not fall either.
 ///   Not so with algebraic equations: what they are off by after a step is an error of the next one, however short;
-/// - where a group stands, its error being UNLIKE times its change, though that is HOLDS_DOWN of what is tolerated or more;
+/// - where a group stands, its error being UNLIKE times its change, though that is HOLDS_DOWN of what is tolerated or more (but not
+///   more than is tolerated or known: at the limit of stability a deviation stands, too, and would grow with what is known of it);
 /// - where it is no more than ALIKE times what is known of it.
 ///
 /// From then on ROUNDED times such an error in the same time is tolerated, up to the tolerance of the largest size so far. That
@@ -50,7 +51,7 @@ const HOLDS_DOWN: f64 = 0.125;
 const ALIKE: f64 = 4.0;
 const ROUNDED: f64 = 4.0;
 const FADES: f64 = 15.0 / 16.0;
-const ROUNDINGS: f64 = 64.0;
+const ROUNDINGS: f64 = 2.0;
 /// A change of y in a step that is smaller than this, relative to the largest size of y so far, is lost in rounding, with some
 /// margin. So an error of v that moves y by less is tolerated, however small v is: near rest, where forces cancel, v is only
 /// rounding.
@@ -70,7 +71,7 @@ const FIRST: f64 = 0.01;
 /// A jump of a force is met by ever shorter steps until one errs by no more than the tolerance of the length that the push would
 /// have made in this part of the time since the start: it must be long beside the roundings of time, and short beside the motion
 /// that follows.
-const PUSHED: f64 = 1.0 / 64.0;
+pub(crate) const PUSHED: f64 = 1.0 / 64.0;
 /// A step in which nothing moves and no stage saw a rate has an estimate of zero that says nothing. The next step is then no
 /// longer than QUIET times the time since the start, or than this one.
 const QUIET: f64 = 1.0 / 32.0;
@@ -384,7 +385,9 @@ impl<N: Number> Pace<N> {
             let next_noise = N::choose(is_rounding, error * per_time, N::of(FADES) * noise);
             let holds_down = N::of(HOLDS_DOWN) * bound[group];
             let stands = (N::of(UNLIKE) * moved).at_most(error) & holds_down.below(error) & zero.below(self.lasts);
-            let taken = N::choose(stands, error * per_time, N::of(FADES) * noise);
+            let (most_known, seen) = (longer(noise, bound[group] * per_time), error * per_time);
+            let known = longer(N::of(FADES) * noise, N::choose(most_known.below(seen), most_known, seen));
+            let taken = N::choose(stands, known, N::of(FADES) * noise);
             let offends = fails & offends;
             let next_noise = N::choose(offends, next_noise, N::choose(takes, taken, noise));
             (next_noise, N::choose(offends, longer(share, failed), N::choose(takes, next_failed, failed)))

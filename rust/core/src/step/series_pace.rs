@@ -6,7 +6,7 @@
 //! rejected only if a function might leave its branch within it, if a number is not finite or if it does not move the time.
 //! `reference/series_pace.py` is the specification.
 
-use super::pace::{Acceptance, LEAST_PART, MAX_FACTOR, ONSET, Pace, ROUNDING, Scales, largest, longer, over, total};
+use super::pace::{Acceptance, LEAST_PART, MAX_FACTOR, ONSET, PUSHED, Pace, ROUNDING, Scales, largest, longer, over, total};
 use crate::{
     functions::{rough_exp2, rough_log2},
     model::{
@@ -94,7 +94,13 @@ pub(crate) fn attempt<N: Number>(
         // Rates that change in a step by their own size change by this in some roundings of the time.
         let per = N::of(TIME_ROUNDING) * longer(end, -end) * (N::of(1.0) / unit);
         let rounded = acceptance.sizes(slopes[0].as_slice(), slopes[1].as_slice()).into_iter().map(|size| size * per);
-        let allowed = allowed.iter().zip(rounded).map(|(allowed, rounded)| *allowed + rounded);
+        // What rests so far counts as long as the rates at the end would have made it in a part of the time since the start.
+        let rests = total(&scales.longest).at_most(N::of(0.0)) & N::of(0.0).below(pace.lasts);
+        let since = N::of(DEFECT * (terms.len() as f64 + 1.0) * PUSHED) * (end - pace.begin);
+        let since = N::choose(rests, since, N::of(0.0));
+        let pushed = acceptance.sizes(rates[0].as_slice(), rates[1].as_slice()).into_iter().enumerate();
+        let pushed = pushed.map(|(group, size)| size * (since * scales.tolerances(group, &pace)[0]));
+        let allowed = allowed.iter().zip(rounded).zip(pushed).map(|((allowed, rounded), pushed)| (*allowed + rounded) + pushed);
         defect.into_iter().zip(allowed).map(|(size, allowed)| (share * size).at_most(allowed)).reduce(|all, each| all & each)
     });
     let (new_v, new_y) = projected.project(new_v, new_y);
@@ -205,7 +211,8 @@ fn reach<N: Number>(
         acceptance.sizes(v.as_slice(), y.as_slice())
     };
     let (present, first, second) = (acceptance.sizes(v.as_slice(), y.as_slice()), of(1), of(2));
-    // A group at zero counts as long as its rate would have made it in the last step, and as a part of the others of its block.
+    // A group at zero counts as long as its rate would have made it in the last step, or the rate of that, and as a part of the
+    // others of its block.
     let [of_v, of_y] = acceptance.counts(v.len(), y.len());
     let mut standing = Vec::new();
     for block in [0..of_v, of_v..of_v + of_y] {
@@ -221,7 +228,8 @@ fn reach<N: Number>(
     let groups = 0..present.len();
     let counts_as = |group: usize| {
         let counts = longer(N::choose(zero.below(pace.lasts), standing[group], zero), present[group]);
-        longer(counts, first[group] * before)
+        let counts = longer(counts, first[group] * before);
+        N::choose(zero.below(counts), counts, second[group] * (before * before))
     };
     let counts_as: Vec<N> = groups.map(counts_as).collect();
     // What begins at zero, where nothing else has been, tolerates no error: it does not count.

@@ -167,8 +167,8 @@ struct Series {
     bounds: HashMap<Id, [f64; 2]>,
     /// Reciprocals of divisors, and of roots twice over, each computed once.
     reciprocals: HashMap<Id, Symbol>,
-    /// Whether a root that is zero, and what is infinite in a divisor or a function, count as constant: there derivatives are not
-    /// finite, or nothing depends on them.
+    /// Whether a root that is zero, and what has an infinite slope in a divisor or a function, count as constant: there derivatives
+    /// are not finite, or nothing depends on them.
     ends: bool,
     /// Whether coefficients of order k are divided by k. The rounding of its reciprocal would be in all of them alike, so that the
     /// energy of a long motion goes to one side. In steps of fixed length, whose unit is 1, they are multiplied by it.
@@ -312,14 +312,14 @@ impl Series {
         by * term
     }
 
-    /// The coefficient above order 0 of a divisor, or of what a function depends on.
+    /// The coefficient above order 0 of a divisor, or of what a function depends on, where it is finite, else 0.
     fn finite(&self, id: Id, k: usize) -> Term {
         let term = self.term(id, k);
         if !self.ends {
             return term;
         }
-        let finite = Symbol(id).and_bits(!(1 << 63)).below(Symbol::of(f64::INFINITY));
-        term.map(|term| Symbol::choose(finite, term, Symbol::of(0.0)))
+        let finite = |term: Symbol| term.and_bits(!(1 << 63)).below(Symbol::of(f64::INFINITY));
+        term.map(|term| Symbol::choose(finite(term), term, Symbol::of(0.0)))
     }
 
     /// Σ aⱼ·bₖ₋ⱼ. Those with the newest coefficients come last: it is these that everything waits for. The others are two sums,
