@@ -1,5 +1,6 @@
 """Events that change the state: the core follows each member by itself, as the reference follows all of them together."""
 
+import itertools
 import warnings
 from typing import Any
 
@@ -51,6 +52,7 @@ SINES = (
 CHATTERING = (38,)
 NONE = np.zeros((2, 2))
 ADAPTIVE = ("dop853", "merson", "tsit5", "rodas5p", "taylor")
+CARRYING = ("verlet", "leapfrog")
 METHODS = ("rk4", "standard_heun", "false_euler", "standard_euler", "dop853", "rosenbrock23", "merson")
 
 
@@ -64,6 +66,11 @@ def driven(t: Any, v: Any, y: Any, *, k: float = 1.0, f: float = 0.5, w: float =
     return -k * y - 0.1 * v + f * np.sin(w * t)
 
 
+@sw.system(order=2)
+def undamped(t: Any, v: Any, y: Any, *, k: float = 1.0, f: float = 0.5, w: float = 1.0) -> Any:
+    return -k * y + f * np.sin(w * t)
+
+
 #: Ways to make such a run with a tolerance.
 ADAPTIVE_WAYS: dict[str, dict[str, Any]] = {
     "three times": {"at": [0.7, 1.5, 2.0]},
@@ -75,10 +82,10 @@ ADAPTIVE_WAYS: dict[str, dict[str, Any]] = {
 }
 
 
-def drawn(number: int, backend: str, way: str | None = None, known: bool = False) -> sw.Run:
+def drawn(number: int, backend: str, way: str | None = None, known: bool = False, carrying: str | None = None) -> sw.Run:
     """A run with one to three of these events, from starts with one decimal place, some of them at an event.
 
-    With some at known times among them, if ``known``.
+    With some at known times among them, if ``known``; ``carrying`` is a method that carries something else than v.
     """
     random = np.random.default_rng([13, number])
     pool = (OF_COORDINATES, OF_A_PLACE)[number % 2]
@@ -93,7 +100,9 @@ def drawn(number: int, backend: str, way: str | None = None, known: bool = False
     w = float(random.choice([0.5, 3.0]))
     if number % 2:
         options |= {"v": np.round(random.normal(size=n), 1), "y": np.round(random.normal(size=n), 1) * (random.random() > 0.2)}
-        system = driven(k=float(random.choice([0.0, 1.0, 4.0])), f=random.choice([0.0, 0.5, 2.0], size=n), w=w)
+        system = (driven if carrying is None else undamped)(
+            k=float(random.choice([0.0, 1.0, 4.0])), f=random.choice([0.0, 0.5, 2.0], size=n), w=w
+        )
     else:
         options |= {"y": np.round(random.normal(size=(2, n)), 1)}
         system = linear(a=np.round(random.normal(size=(2, 2)), 1), b=np.round(random.normal(size=2), 1), w=w)
@@ -101,7 +110,7 @@ def drawn(number: int, backend: str, way: str | None = None, known: bool = False
     if way is not None:
         states = {name: options[name] for name in ("v", "y") if name in options}
         options = {**states, "tolerance": 1e-5, **ADAPTIVE_WAYS[way]}
-    return sw.integrate(system, method, events=events, backend=backend, **options)
+    return sw.integrate(system, carrying or method, events=events, backend=backend, **options)
 
 
 def check_the_core_follows_as_the_reference_does(numbers: range, way: str | None = None, known: bool = False) -> None:
@@ -130,6 +139,32 @@ def test_with_known_times_too(way: str | None) -> None:
     )
 
 
+@pytest.mark.parametrize("method", CARRYING)
+def test_methods_that_carry_something_else_than_v_too(method: str) -> None:
+    """Drawn runs; and some that come to rest, wait for a push or a kick, and go on."""
+
+    def assert_equal(made: Any) -> sw.Run:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            run, reference = map(made, ("rust", "numpy"))
+        assert_same_run(run, reference)
+        assert [str(each) for each in run.findings] == [str(each) for each in reference.findings]
+        return run
+
+    for number, known in itertools.product(range(1, 30, 2), (False, True)):
+        assert_equal(lambda backend, of=(number, known): drawn(of[0], backend, None, of[1], method))
+    pushed = sw.system(order=2)(lambda t, v, y, *, f=1.0: f * np.sin(t) - 1.0)(f=np.linspace(0.0, 2.0, 7))
+    floor = sw.Event(lambda t, v, y: y, direction=-1, then=lambda t, v, y: (np.maximum(v, 0.0), np.maximum(y, 0.0)), name="floor")
+    kick = sw.Event(times=1.3, period=1.1, then=lambda t, v, y: (v + 0.9, y), name="kick")
+    rested = 0
+    for events in ([OF_A_PLACE["bounce"]()], [OF_A_PLACE["soft"]()], [floor], [floor, kick], [floor, OF_A_PLACE["top"]()]):
+        for dt, every in ((0.3, 1), (0.05, None), (0.1, 3)):
+            options: Any = {"v": np.zeros(7), "y": np.linspace(0.0, 1.0, 7), "dt": dt, "steps": round(9.0 / dt), "every": every}
+            run = assert_equal(lambda backend, o=options, e=events: sw.integrate(pushed, method, events=e, backend=backend, **o))
+            rested += int((run.status == sw.Status.REST).sum())
+    assert rested > 20
+
+
 @pytest.mark.parametrize("way", ADAPTIVE_WAYS)
 def test_with_a_tolerance_too(way: str) -> None:
     """Where the core leaves such a run to the reference's driver, it locates the events."""
@@ -137,16 +172,17 @@ def test_with_a_tolerance_too(way: str) -> None:
 
 
 def test_no_member_waits_for_others(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Steps with events that change the state are the core's, but by methods that carry something else than v, and by series."""
+    """Steps with events that change the state are the core's, but in float32 and by series."""
     grouped: list[int] = []
     group = driver._Resetting._group
     monkeypatch.setattr(driver._Resetting, "_group", lambda self, *of: grouped.append(1) or group(self, *of))
     bounce = OF_A_PLACE["bounce"]()
     options: Any = {"v": 0.0, "y": np.linspace(0.1, 1.0, 5), "dt": 0.02, "steps": 100, "events": bounce}
     assert sw.integrate(driven(f=0.0), "rk4", **options).events["bounce"].count.sum() >= 5
-    assert not grouped
     falling = sw.system(order=2)(lambda t, v, y: -1.0 + 0.0 * y)()
     assert sw.integrate(falling, "verlet", **options).events["bounce"].count.sum() >= 5
+    assert not grouped
+    assert sw.integrate(falling, "rk4", dtype="float32", **options).events["bounce"].count.sum() >= 5
     assert grouped
     looked: list[int] = []
     look = adaptive._Resetting.look

@@ -288,6 +288,7 @@ USES: dict[str, tuple[Callable[[sw.Run, Path], Any], str]] = {
         lambda run, _: sw.charts.run_picture(sw.scenes.figure_eight(), run),
         "run: expected one member with states of shape|run: expected a run of the scene",
     ),
+    "has_each_step": (lambda run, _: run(run.t[0, 0]) if run.has_each_step else None, "t: .* within the run|not known after"),
     "state_error": (lambda run, _: sw.scenes.figure_eight().state_error(run), "run: expected a run of the scene"),
 }
 

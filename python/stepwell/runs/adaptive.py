@@ -45,7 +45,8 @@ def adaptive_run(request: Request, waypoints: list[Array] | None = None) -> Run:
         t, v, y = keeper.saved(plan, start, (np.broadcast_to(pacing.at[-1], plan.batch), v[-1], y[-1]))
         t = (-1.0 if plan.backward else 1.0) * t
     run = run_of(request, out, t, v, y)
-    run.has_each_step = every == 1
+    if every == 1:
+        run.has_each_step = True
     if request.record:
         from .engine.recorded import recorded  # only runs that record need it
 

@@ -5,7 +5,6 @@ use std::{fmt, sync::Mutex};
 use super::{
     evaluation::{Evaluation, Evaluator, Filled},
     found::Found,
-    watch::may_change,
 };
 use smallvec::SmallVec;
 
@@ -119,23 +118,6 @@ pub struct Events<'a> {
 impl fmt::Debug for Events<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("Events").field("number", &self.events.len()).finish_non_exhaustive()
-    }
-}
-
-impl Events<'_> {
-    /// The first time of an event after this one, infinite or none where it is not known, in the order of the motion.
-    pub(crate) fn next(&self, e: usize, member: usize, t: f64) -> Option<f64> {
-        Some(self.events[e].times.as_ref()?.after(member, self.way * t)[0])
-    }
-
-    /// Whether an event may occur in a step between these times, by its times or by its quantity one step before and at both ends.
-    pub(crate) fn may_occur(&self, e: usize, member: usize, [before, g, g_end]: [f64; 3], [t, t_end]: [f64; 2]) -> bool {
-        self.next(e, member, t).map_or_else(|| may_change(before, g, g_end), |next| next <= self.way * t_end)
-    }
-
-    /// Whether an event occurs between these times, as is known before.
-    pub(crate) fn comes(&self, member: usize, t: f64, t_end: f64) -> bool {
-        (0..self.events.len()).any(|e| self.next(e, member, t).is_some_and(|next| next <= self.way * t_end))
     }
 }
 

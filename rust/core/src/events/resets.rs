@@ -73,12 +73,17 @@ impl Memory {
     }
 
     /// Whether it begins where an event changed its state, or holds it.
-    fn is_fresh(&self) -> bool {
+    pub(crate) fn is_fresh(&self) -> bool {
         (0..self.at.len()).any(|e| self.at[e] != 0.0 && (self.led_back[e] || !self.lain[e]))
     }
 
+    /// Whether it is at rest.
+    pub(crate) fn rests(&self) -> bool {
+        self.rest.is_some()
+    }
+
     /// Goes on to the end of a step, where the quantity of an event is `g`. It may have left the event at which it lay.
-    fn goes_on(&mut self, e: usize, g: f64) {
+    pub(crate) fn goes_on(&mut self, e: usize, g: f64) {
         if self.lain[e] && g != 0.0 {
             (self.at[e], self.lain[e]) = (0.0, false);
         }
@@ -583,7 +588,7 @@ impl Watch<'_> {
     }
 
     /// Whether a member goes on in a step; one at rest does where the event no longer holds it at the end.
-    fn wakes(&mut self, each: &mut Followed, number: i64, h: f64) -> bool {
+    pub(crate) fn wakes(&mut self, each: &mut Followed, number: i64, h: f64) -> bool {
         let Some(rest) = each.memory.rest else { return true };
         let member = each.memory.member;
         let [t, t_end] = [number, number + 1].map(|number| self.time(member, number, h));
@@ -606,8 +611,8 @@ impl Watch<'_> {
         events.begin.at(member) + number as f64 * h
     }
 
-    /// Looks for events in a step of a member, whose quantities at the end are `next`.
-    fn look(&mut self, each: &mut Followed, whole: Step, next: &[f64]) {
+    /// Looks for events in a step of a member, whose quantities at the end are `next`. Returns whether its state is then another.
+    pub(crate) fn look(&mut self, each: &mut Followed, whole: Step, next: &[f64]) -> bool {
         let (step, memory) = (Arc::new(whole), &mut *each.memory);
         let member = memory.member;
         let start = At { member, t: step.t, state: &step.start };
@@ -630,7 +635,7 @@ impl Watch<'_> {
                 of_event.into_iter().for_each(|change| self.put_off(e, change));
             }
             next.iter().enumerate().for_each(|(e, g)| memory.goes_on(e, *g));
-            return;
+            return false;
         }
         let end = self.time(member, step.number + 1, step.h);
         let stretch = Step { h: end - step.t, start: step.start.clone(), end: step.end.clone(), ..*step };
@@ -651,6 +656,7 @@ impl Watch<'_> {
         memory.before.fill(f64::NAN);
         memory.now = self.all_g(At { member, t: end, state: &state });
         each.state = state;
+        true
     }
 
     /// Notes where a member is at rest at the end of the run.

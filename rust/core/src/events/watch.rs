@@ -16,7 +16,7 @@ const LOCATED_AT_ONCE: usize = 1 << 10;
 
 /// A whole step of a member.
 #[derive(Debug)]
-pub(crate) struct Step {
+pub struct Step {
     pub member: usize,
     /// Its number, or how many steps the member had taken before.
     pub number: i64,
@@ -86,7 +86,7 @@ pub(super) struct Located {
 }
 
 /// Where a member stops: in this step.
-pub(crate) struct Stop {
+pub struct Stop {
     pub step: Arc<Step>,
     pub t: f64,
     pub state: Numbers,
@@ -104,8 +104,8 @@ impl Stop {
 }
 
 /// The events of some members, by one thread.
-pub(crate) struct Watch<'a> {
-    pub motion: Motion<'a>,
+pub struct Watch<'a> {
+    pub(crate) motion: Motion<'a>,
     pub(super) first: usize,
     pub(super) found: Found,
     /// Steps in which something may occur.
@@ -554,8 +554,25 @@ fn trial<'s>(
     (there, g)
 }
 
+impl Events<'_> {
+    /// The first time of an event after this one, infinite or none where it is not known, in the order of the motion.
+    pub(crate) fn next(&self, e: usize, member: usize, t: f64) -> Option<f64> {
+        Some(self.events[e].times.as_ref()?.after(member, self.way * t)[0])
+    }
+
+    /// Whether an event may occur in a step between these times, by its times or by its quantity one step before and at both ends.
+    pub(crate) fn may_occur(&self, e: usize, member: usize, [before, g, g_end]: [f64; 3], [t, t_end]: [f64; 2]) -> bool {
+        self.next(e, member, t).map_or_else(|| may_change(before, g, g_end), |next| next <= self.way * t_end)
+    }
+
+    /// Whether an event occurs between these times, as is known before.
+    pub(crate) fn comes(&self, member: usize, t: f64, t_end: f64) -> bool {
+        (0..self.events.len()).any(|e| self.next(e, member, t).is_some_and(|next| next <= self.way * t_end))
+    }
+}
+
 /// Whether g may change its sign between two states, once or twice: see `reference/events.py`.
-pub(crate) fn may_change(before: f64, g: f64, next: f64) -> bool {
+fn may_change(before: f64, g: f64, next: f64) -> bool {
     let bend = ((next - g) - (g - before)).abs();
     let bend = if before.is_nan() { f64::INFINITY } else { REACH * bend };
     let (size, last) = (next.abs(), g.abs());

@@ -4,7 +4,7 @@ mod events;
 
 use std::{sync::Arc, time::Instant};
 
-use self::events::{Looks, Stepped};
+use self::events::{Looking, Looks, Stepped};
 
 use super::{
     Model,
@@ -112,6 +112,15 @@ pub trait Steppable: Traceable {
         clock: &Clock,
         steps: f64,
     ) -> Result<Box<dyn Group<Self>>, Error>;
+
+    /// What looks for events in the steps of so many members from `first` on, in so many lanes, which may notice where one may be.
+    fn looks<'l, 'a: 'l>(
+        watch: &'l mut Watch<'a>,
+        notices: bool,
+        lanes: usize,
+        first: usize,
+        count: usize,
+    ) -> Option<Box<dyn Looking<Self> + 'l>>;
 }
 
 impl Steppable for f64 {
@@ -125,6 +134,16 @@ impl Steppable for f64 {
     ) -> Result<Box<dyn Group>, Error> {
         model.group(traced, machine, members, clock, steps)
     }
+
+    fn looks<'l, 'a: 'l>(
+        watch: &'l mut Watch<'a>,
+        notices: bool,
+        lanes: usize,
+        first: usize,
+        count: usize,
+    ) -> Option<Box<dyn Looking<f64> + 'l>> {
+        Some(Box::new(Looks::new(watch, notices, lanes, first, count)))
+    }
 }
 
 impl Steppable for f32 {
@@ -137,6 +156,17 @@ impl Steppable for f32 {
         _steps: f64,
     ) -> Result<Box<dyn Group<f32>>, Error> {
         Ok(Box::new(Lanes::<f32>::new(traced, &model.spec, machine.level, members, clock)?))
+    }
+
+    /// Quantities are of numbers of 64 bits.
+    fn looks<'l, 'a: 'l>(
+        _watch: &'l mut Watch<'a>,
+        _notices: bool,
+        _lanes: usize,
+        _first: usize,
+        _count: usize,
+    ) -> Option<Box<dyn Looking<f32> + 'l>> {
+        None
     }
 }
 
@@ -293,7 +323,7 @@ impl<'a, T: Steppable> Worker<'a, T> {
             let count = (members - from).min(group.lanes());
             let (part, checked) = (&mut part, plan.first);
             let notices = plan.model.key.signature.watched.is_some() && !group.tally().is_empty();
-            let looks = watch.as_mut().map(|watch| Looks::new(watch, notices, group.lanes(), part.first + from, count));
+            let looks = watch.as_mut().and_then(|watch| T::looks(watch, notices, group.lanes(), part.first + from, count));
             let mut job = Job { plan, carries, first_piece, group, part, from, count, good: &mut good, checked, looks };
             let ran = job.run(go_on);
             self.good = good;
@@ -321,7 +351,7 @@ struct Checks {
 struct Job<'a, 'b, 'w, T: Real> {
     plan: &'a FixedRun<'a>,
     /// Where events are looked for.
-    looks: Option<Looks<'a, 'w, T>>,
+    looks: Option<Box<dyn Looking<T> + 'w>>,
     /// The v slot holds something else than v between steps: finish before keeping it.
     carries: bool,
     /// How many steps until the first check.
@@ -434,15 +464,29 @@ impl<T: Real> Job<'_, '_, '_, T> {
         put(&mut self.part.tally, 0, self.from, self.count, self.group.tally(), lanes);
         if let Some(mut looks) = self.looks.take() {
             looks.end();
-            self.write_stops(&looks);
+            self.write_stops(&*looks);
         }
         true
     }
 
-    /// Writes the states of members that stopped, also for all later saved states.
-    fn write_stops(&mut self, looks: &Looks<T>) {
+    /// Writes the states that events gave to members, and of those that stopped, for all later saved states, too.
+    fn write_stops(&mut self, looks: &dyn Looking<T>) {
         let plan = self.plan;
-        let (p, q) = self.rows();
+        for (lane, given) in looks.given().iter().enumerate() {
+            for ([from, until], state) in given {
+                let column = self.from + lane;
+                for i in 0..kept(plan.steps, plan.every) {
+                    let step = plan.first + save(plan.steps, plan.every, i);
+                    if (*from..*until).contains(&step) {
+                        self.write(i, column, state);
+                    }
+                }
+                if *until == i64::MAX {
+                    self.part.first_bad[column] = -1;
+                    self.forget_carry(column);
+                }
+            }
+        }
         for (lane, stop) in looks.stops().iter().enumerate() {
             let Some(stop) = stop else { continue };
             let column = self.from + lane;
@@ -451,13 +495,23 @@ impl<T: Real> Job<'_, '_, '_, T> {
                 if save(plan.steps, plan.every, i) <= stop.step.number - plan.first {
                     continue;
                 }
-                let (v, y) = stop.state.split_at(p);
-                v.iter().enumerate().for_each(|(row, x)| self.part.saved_v.row(i * p + row)[column] = T::of(*x));
-                y.iter().enumerate().for_each(|(row, x)| self.part.saved_y.row(i * q + row)[column] = T::of(*x));
+                self.write(i, column, &stop.state);
             }
-            // What the method would carry from there on is not known.
-            (0..self.part.carry.rows()).for_each(|row| self.part.carry.row(row)[column] = T::of(f64::NAN));
+            self.forget_carry(column);
         }
+    }
+
+    /// Writes a saved state of a member.
+    fn write(&mut self, i: usize, column: usize, state: &[f64]) {
+        let (p, q) = self.rows();
+        let (v, y) = state.split_at(p);
+        v.iter().enumerate().for_each(|(row, x)| self.part.saved_v.row(i * p + row)[column] = T::of(*x));
+        y.iter().enumerate().for_each(|(row, x)| self.part.saved_y.row(i * q + row)[column] = T::of(*x));
+    }
+
+    /// What the method would carry from there on is not known.
+    fn forget_carry(&mut self, column: usize) {
+        (0..self.part.carry.rows()).for_each(|row| self.part.carry.row(row)[column] = T::of(f64::NAN));
     }
 
     /// Makes steps.
@@ -474,6 +528,7 @@ impl<T: Real> Job<'_, '_, '_, T> {
                     h: self.plan.clock.h,
                     first_bad: &mut self.part.first_bad[from..from + count],
                     carried: self.plan.carried,
+                    begin: [&self.plan.v, &self.plan.y],
                     group: &mut *self.group,
                 };
                 looks.advance(&mut on, k, n);
@@ -515,7 +570,8 @@ impl<T: Real> Job<'_, '_, '_, T> {
             self.group.record(rows);
             put(&mut self.part.recorded, i * recorded, self.from, self.count, rows, lanes);
         }
-        let diverged = self.carries && self.any_new(T::INFINITY);
+        let is_followed = self.looks.as_ref().is_some_and(|looks| looks.changes());
+        let diverged = self.carries && !is_followed && self.any_new(T::INFINITY);
         self.unfinish();
         if diverged {
             self.retrace(k);
@@ -595,7 +651,7 @@ impl<T: Real> Job<'_, '_, '_, T> {
     /// method's carry may be infinite and later finite again, but only if its numbers are [`Real::HUGE`].
     /// Where events change states, they are looked at while these happen.
     fn is_suspect(&self) -> bool {
-        if self.looks.as_ref().is_some_and(Looks::changes) {
+        if self.looks.as_ref().is_some_and(|looks| looks.changes()) {
             return false;
         }
         let most = if self.carries { huge(self.plan.clock.h) } else { T::INFINITY };

@@ -10,7 +10,7 @@ use crate::{
         watch::{Candidates, Noticed, Step, Stop, Watch},
     },
     group::Group,
-    model::spec::Spec,
+    model::spec::{Row, Spec},
     tape::real::Real,
 };
 
@@ -27,7 +27,7 @@ const NOTICED_OF_GROUP: i64 = 1 << 11;
 const FEWER_AGAIN: usize = 2;
 
 /// The quantities of a group while it is stepped.
-pub(super) struct Looks<'w, 'a, T> {
+pub(super) struct Looks<'w, 'a> {
     watch: &'w mut Watch<'a>,
     /// Of each event.
     tiles: Vec<Filled>,
@@ -35,8 +35,14 @@ pub(super) struct Looks<'w, 'a, T> {
     now: Vec<Vec<f64>>,
     before: Vec<Vec<f64>>,
     /// The states before each of some steps and after the last, v before y, in rows of lanes.
-    states: Vec<T>,
-    carried: Vec<T>,
+    states: Vec<f64>,
+    carried: Vec<f64>,
+    /// The quantities in these states.
+    values: Vec<f64>,
+    /// What the lanes carry in place of v in each of these states, if events change some.
+    slots: Vec<f64>,
+    /// States that events gave to members, of a method that carries something else than v: from one step on until before another.
+    given: Vec<Vec<([i64; 2], Numbers)>>,
     /// Whether the quantities of the present state are known.
     begun: bool,
     /// Whether the steps themselves notice whether an event may occur, and how many of these are made at a time.
@@ -48,7 +54,7 @@ pub(super) struct Looks<'w, 'a, T> {
     memories: Vec<Memory>,
 }
 
-impl<'w, 'a, T> Looks<'w, 'a, T> {
+impl<'w, 'a> Looks<'w, 'a> {
     /// For so many members from `first` on.
     pub(super) fn new(watch: &'w mut Watch<'a>, notices: bool, lanes: usize, first: usize, count: usize) -> Self {
         let mut tiles = watch.motion.in_lanes(lanes);
@@ -68,6 +74,9 @@ impl<'w, 'a, T> Looks<'w, 'a, T> {
             tiles,
             states: Vec::new(),
             carried: Vec::new(),
+            slots: Vec::new(),
+            values: Vec::new(),
+            given: (0..remembered).map(|_| Vec::new()).collect(),
             begun: false,
             notices,
             together: NOTICED_AT_FIRST,
@@ -77,10 +86,38 @@ impl<'w, 'a, T> Looks<'w, 'a, T> {
     }
 }
 
+/// Fills a tile of a quantity with a time, so long after those of step 0, and a state, by rows of lanes.
+fn fill(tile: &mut Filled, (on, events): (&Stepped<f64>, &Events), state: &[f64], since: f64) {
+    tile.row(0).iter_mut().enumerate().for_each(|(lane, t)| {
+        *t = events.sign * (events.begin.at(on.first + lane.min(on.count - 1)) + since);
+    });
+    for (i, numbers) in state.chunks_exact(on.group.lanes()).enumerate() {
+        tile.row(1 + i).iter_mut().zip(numbers).for_each(|(x, number)| *x = *number); // there may be no such row
+    }
+}
+
 /// Whether an event occurs at a known time within so many steps of a member, from the k-th on.
 fn comes(events: &Events, member: usize, (k, n, h): (i64, i64, f64)) -> bool {
     let [t, t_end] = [k, k + n].map(|number| events.begin.at(member) + number as f64 * h);
     events.comes(member, t, t_end)
+}
+
+/// What looks for events in the steps of a group.
+pub trait Looking<T: Real> {
+    /// Where members stopped.
+    fn stops(&self) -> &[Option<Stop>];
+
+    /// States that events gave to members, of a method that carries something else than v: from one step on until before another.
+    fn given(&self) -> &[Vec<([i64; 2], Numbers)>];
+
+    /// Whether events change states: then steps cannot be made again without them.
+    fn changes(&self) -> bool;
+
+    /// Ends the run of these members.
+    fn end(&mut self);
+
+    /// Makes steps, and looks for events in them.
+    fn advance(&mut self, on: &mut Stepped<T>, k: i64, steps: i64);
 }
 
 /// A step of a lane in which an event may occur: its number among those that were made together, and the quantity at both ends.
@@ -92,7 +129,7 @@ struct Seen {
 }
 
 /// Members that are stepped together, and how.
-pub(super) struct Stepped<'s, T: Real> {
+pub struct Stepped<'s, T: Real> {
     pub(super) group: &'s mut dyn Group<T>,
     /// The v slot holds something else than v between steps.
     pub(super) carries: bool,
@@ -104,6 +141,8 @@ pub(super) struct Stepped<'s, T: Real> {
     pub(super) first_bad: &'s mut [i64],
     /// The run goes on from an earlier one.
     pub(super) carried: bool,
+    /// The states at the start of the run, by rows.
+    pub(super) begin: [&'s [Row<'s>]; 2],
 }
 
 impl<T: Real> Stepped<'_, T> {
@@ -114,25 +153,24 @@ impl<T: Real> Stepped<'_, T> {
     }
 }
 
-impl<T: Real> Looks<'_, '_, T> {
-    /// Where members stopped.
-    pub(super) fn stops(&self) -> &[Option<Stop>] {
+impl Looking<f64> for Looks<'_, '_> {
+    fn stops(&self) -> &[Option<Stop>] {
         &self.stops
     }
 
-    /// Whether events change states: then steps cannot be made again without them.
-    pub(super) fn changes(&self) -> bool {
+    fn changes(&self) -> bool {
         !self.memories.is_empty()
     }
 
-    /// Ends the run of these members.
-    pub(super) fn end(&mut self) {
+    fn end(&mut self) {
         self.memories.iter().for_each(|memory| self.watch.end_member(memory));
     }
 
-    /// Makes steps, and looks for events in them.
-    pub(super) fn advance(&mut self, on: &mut Stepped<T>, mut k: i64, steps: i64) {
+    fn advance(&mut self, on: &mut Stepped<f64>, mut k: i64, steps: i64) {
         let until = k + steps;
+        if self.changes() && on.carries {
+            return self.advance_carrying(on, k, until);
+        }
         if self.changes() {
             return self.advance_with_changes(on, k, until);
         }
@@ -157,30 +195,167 @@ impl<T: Real> Looks<'_, '_, T> {
         }
     }
 
+    fn given(&self) -> &[Vec<([i64; 2], Numbers)>] {
+        &self.given
+    }
+}
+
+impl Looks<'_, '_> {
     /// What is noticed begins with the quantities at the present state and one step before.
-    fn begin_to_notice(&mut self, on: &mut Stepped<T>) {
+    fn begin_to_notice(&mut self, on: &mut Stepped<f64>) {
         if !self.notices {
             return;
         }
         let (lanes, tally) = (on.group.lanes(), on.group.tally_mut());
         let first = tally.len() - (2 * self.now.len() + 1) * lanes;
         for (rows, (before, now)) in tally[first..].chunks_exact_mut(2 * lanes).zip(self.before.iter().zip(&self.now)) {
-            rows.iter_mut().zip(before.iter().chain(now)).for_each(|(to, number)| *to = T::of(*number));
+            rows.iter_mut().zip(before.iter().chain(now)).for_each(|(to, number)| *to = *number);
+        }
+    }
+
+    /// Whether a member goes on.
+    fn goes_on(&self) -> bool {
+        self.memories.iter().zip(&self.stops).any(|(memory, stop)| !memory.ended && stop.is_none())
+    }
+
+    /// Makes steps with events that change states, of a method that carries something else than v: all lanes go on from the end of the
+    /// first step in which one is changed, where what that one carries begins anew.
+    fn advance_carrying(&mut self, on: &mut Stepped<f64>, mut k: i64, until: i64) {
+        let (h, (p, _)) = (on.h, on.rows());
+        while k < until && self.goes_on() {
+            let n = (until - k).min(self.together) as usize;
+            self.make_steps(on, k, n as i64);
+            if !self.begun {
+                for memory in &mut self.memories {
+                    let state: Numbers = on.begin[0][..p].iter().chain(on.begin[1]).map(|row| row.at(memory.member)).collect();
+                    let t = self.watch.motion.events.begin.at(memory.member) + k as f64 * h;
+                    self.watch.begin_member(memory, t, h, &state, on.carried);
+                }
+                self.begun = true;
+            }
+            self.find_quantities(on, k, n);
+            let (mut made, mut changed) = (n, Vec::new());
+            for row in 0..n {
+                self.wake(on, k + row as i64, &mut changed);
+                if !changed.is_empty() {
+                    made = row;
+                    break;
+                }
+                for lane in 0..on.count {
+                    self.look_at(on, (k, row), lane, &mut changed);
+                }
+                if !changed.is_empty() {
+                    made = row + 1;
+                    break;
+                }
+            }
+            let [least, most] = NOTICED_AT_ONCE;
+            self.together = if changed.is_empty() { (self.together * 2).min(most) } else { (self.together / 2).max(least) };
+            k += made as i64;
+            self.begin_anew(on, k, made, changed);
+        }
+    }
+
+    /// The quantities of all members in the states before each of some steps and after the last, by states, events and lanes.
+    fn find_quantities(&mut self, on: &Stepped<f64>, k: i64, steps: usize) {
+        let (lanes, events) = (on.group.lanes(), self.watch.motion.events);
+        let block = self.states.len() / (steps + 1);
+        self.values.clear();
+        for (row, state) in self.states.chunks_exact(block.max(1)).enumerate() {
+            for tile in &mut self.tiles {
+                fill(tile, (on, events), state, (k + row as i64) as f64 * on.h);
+                tile.run();
+                self.values.extend_from_slice(&tile.values[..lanes]);
+            }
+        }
+    }
+
+    /// The quantities of a member in one of these states.
+    fn values_of(&self, lanes: usize, lane: usize, row: usize) -> Numbers {
+        let events = self.tiles.len();
+        self.values[row * events * lanes..(row + 1) * events * lanes].iter().skip(lane).step_by(lanes).copied().collect()
+    }
+
+    /// Members at rest that their events let go in a step.
+    fn wake(&mut self, on: &Stepped<f64>, number: i64, changed: &mut Vec<(usize, Numbers)>) {
+        for (lane, memory) in self.memories.iter_mut().enumerate() {
+            let Some(([_, until], state)) = self.given[lane].last_mut().filter(|_| memory.rests() && !memory.ended) else {
+                continue;
+            };
+            let mut each = Followed { memory, state: state.clone(), first_bad: None, stop: None };
+            if self.watch.wakes(&mut each, number, on.h) {
+                *until = number + 1;
+                changed.push((lane, each.state));
+            }
+        }
+    }
+
+    /// Looks for events in a step of a lane, the `row`-th after the `k`-th, and notes the state that they give its member.
+    fn look_at(&mut self, on: &mut Stepped<f64>, (k, row): (i64, usize), lane: usize, changed: &mut Vec<(usize, Numbers)>) {
+        let (lanes, number, of_run) = (on.group.lanes(), k + row as i64, self.watch.motion.events);
+        let (g, next) = (self.values_of(lanes, lane, row), self.values_of(lanes, lane, row + 1));
+        let memory = &mut self.memories[lane];
+        if self.stops[lane].is_some() || memory.rests() || on.first_bad[lane] >= 0 {
+            return;
+        }
+        let (p, q) = on.rows();
+        let block = (p + q) * lanes;
+        let state = |row: usize| -> Numbers {
+            self.states[row * block..(row + 1) * block].iter().skip(lane).step_by(lanes).copied().collect()
+        };
+        let (start, end, member) = (state(row), state(row + 1), memory.member);
+        if start.iter().chain(&end).any(|x| !x.is_finite()) {
+            on.first_bad[lane] = number + 1;
+            return;
+        }
+        memory.now = g;
+        let [t, t_end] = [number, number + 1].map(|number| of_run.begin.at(member) + number as f64 * on.h);
+        let may = |e: usize| of_run.may_occur(e, member, [memory.before[e], memory.now[e], next[e]], [t, t_end]);
+        if !memory.is_fresh() && !(0..next.len()).any(may) {
+            next.iter().enumerate().for_each(|(e, g)| memory.goes_on(e, *g));
+            return;
+        }
+        let whole = Step { member, number, t, h: on.h, t_end, start, end: end.clone(), window: None };
+        let mut each = Followed { memory, state: end, first_bad: None, stop: None };
+        if self.watch.look(&mut each, whole, &next) {
+            let Followed { memory, state, stop, .. } = each;
+            let until = if memory.rests() { i64::MAX } else { number + 2 };
+            self.given[lane].push(([number + 1, until], state.clone()));
+            self.stops[lane] = stop;
+            changed.push((lane, state));
+        }
+    }
+
+    /// Brings lanes to where they were after so many of the steps that were made, at step `k`, some of them in another state.
+    fn begin_anew(&mut self, on: &mut Stepped<f64>, k: i64, made: usize, changed: Vec<(usize, Numbers)>) {
+        if changed.is_empty() {
+            return;
+        }
+        let (lanes, (p, q)) = (on.group.lanes(), on.rows());
+        let (block, carried) = ((p + q) * lanes, &self.slots[made * p * lanes..(made + 1) * p * lanes]);
+        let (v, y) = on.group.slots_mut();
+        y.copy_from_slice(&self.states[made * block + p * lanes..(made + 1) * block]);
+        for (lane, state) in &changed {
+            let slots = v.iter_mut().skip(*lane).step_by(lanes).chain(y.iter_mut().skip(*lane).step_by(lanes));
+            slots.zip(state).for_each(|(to, x)| *to = *x);
+        }
+        on.group.start(k);
+        let v = on.group.slots_mut().0;
+        for lane in (0..lanes).filter(|lane| !changed.iter().any(|(other, _)| other == lane)) {
+            v.iter_mut().skip(lane).step_by(lanes).zip(carried.iter().skip(lane).step_by(lanes)).for_each(|(to, x)| *to = *x);
         }
     }
 
     /// Makes steps with events that change states: those of members at which nothing happens in the lanes, all others again.
-    fn advance_with_changes(&mut self, on: &mut Stepped<T>, mut k: i64, until: i64) {
+    fn advance_with_changes(&mut self, on: &mut Stepped<f64>, mut k: i64, until: i64) {
         let (lanes, events, h) = (on.group.lanes(), self.now.len(), on.h);
-        let goes_on =
-            |looks: &Self| looks.memories.iter().zip(&looks.stops).any(|(memory, stop)| !memory.ended && stop.is_none());
-        while k < until && goes_on(self) {
+        while k < until && self.goes_on() {
             let n = (until - k).min(if self.begun { self.together } else { 1 });
             self.states.clear();
             let (v, y) = on.group.slots();
             self.states.extend_from_slice(v);
             self.states.extend_from_slice(y);
-            let state_of = |states: &[T], lane: usize| states.iter().skip(lane).step_by(lanes).map(|x| x.wide()).collect();
+            let state_of = |states: &[f64], lane: usize| states.iter().skip(lane).step_by(lanes).copied().collect();
             if !self.begun {
                 for (lane, memory) in self.memories.iter_mut().enumerate() {
                     let state: Numbers = state_of(&self.states, lane);
@@ -195,15 +370,14 @@ impl<T: Real> Looks<'_, '_, T> {
             let mut noticed = Vec::new();
             if self.notices {
                 let tally = on.group.tally_mut();
-                tally[first_row + rows..].fill(T::default());
+                tally[first_row + rows..].fill(0.0);
                 noticed.extend_from_slice(&tally[first_row..first_row + rows]);
                 on.group.advance(k, n);
             }
             let (v, y) = on.group.slots();
             let is_finite =
-                |lane: usize| [v, y].iter().all(|slot| slot.iter().skip(lane).step_by(lanes).all(|x| x.is_below(T::INFINITY)));
-            let may =
-                |lane: usize| !self.notices || on.group.tally()[first_row + rows + lane] != T::default() || !is_finite(lane);
+                |lane: usize| [v, y].iter().all(|slot| slot.iter().skip(lane).step_by(lanes).all(|x| x.is_below(f64::INFINITY)));
+            let may = |lane: usize| !self.notices || on.group.tally()[first_row + rows + lane] != 0.0 || !is_finite(lane);
             let is_followed = |lane: &usize| {
                 let (is_bad, memory) = (self.notices && on.first_bad[*lane] >= 0, &self.memories[*lane]);
                 let is_due = || may(*lane) || comes(self.watch.motion.events, memory.member, (k, n, h));
@@ -218,7 +392,7 @@ impl<T: Real> Looks<'_, '_, T> {
                     continue;
                 }
                 if self.notices {
-                    let number = |row: usize| noticed[row * lanes + lane].wide();
+                    let number = |row: usize| noticed[row * lanes + lane];
                     memory.before.iter_mut().enumerate().for_each(|(e, before)| *before = number(2 * e));
                     memory.now.iter_mut().enumerate().for_each(|(e, now)| *now = number(2 * e + 1));
                 }
@@ -230,7 +404,7 @@ impl<T: Real> Looks<'_, '_, T> {
             for (lane, (state, first_bad, stop)) in places.iter().zip(results) {
                 let (v, y) = on.group.slots_mut();
                 let slots = v.iter_mut().skip(*lane).step_by(lanes).chain(y.iter_mut().skip(*lane).step_by(lanes));
-                slots.zip(state).for_each(|(to, x)| *to = T::of(x));
+                slots.zip(state).for_each(|(to, x)| *to = x);
                 on.first_bad[*lane] = first_bad.unwrap_or(-1);
                 self.stops[*lane] = stop;
             }
@@ -240,7 +414,7 @@ impl<T: Real> Looks<'_, '_, T> {
     }
 
     /// Chooses how many steps are made together, after so many of members have to be repeated.
-    fn choose_together(&mut self, again: usize, on: &Stepped<T>) {
+    fn choose_together(&mut self, again: usize, on: &Stepped<f64>) {
         let [least, most] = NOTICED_AT_ONCE;
         if again * FEWER_AGAIN > on.count {
             self.together = (self.together / 2).max(least);
@@ -250,7 +424,7 @@ impl<T: Real> Looks<'_, '_, T> {
     }
 
     /// What is noticed of these lanes goes on with the quantities that are remembered.
-    fn remember(&self, on: &mut Stepped<T>, places: impl Iterator<Item = usize>) {
+    fn remember(&self, on: &mut Stepped<f64>, places: impl Iterator<Item = usize>) {
         if !self.notices {
             return;
         }
@@ -260,19 +434,19 @@ impl<T: Real> Looks<'_, '_, T> {
         for lane in places {
             let memory = &self.memories[lane];
             for (e, (before, now)) in memory.before.iter().zip(&memory.now).enumerate() {
-                tally[first + 2 * e * lanes + lane] = T::of(*before);
-                tally[first + (2 * e + 1) * lanes + lane] = T::of(*now);
+                tally[first + 2 * e * lanes + lane] = *before;
+                tally[first + (2 * e + 1) * lanes + lane] = *now;
             }
         }
     }
 
     /// Makes steps that notice whether an event may occur in them.
-    fn make_and_notice(&mut self, on: &mut Stepped<T>, k: i64, n: i64) {
+    fn make_and_notice(&mut self, on: &mut Stepped<f64>, k: i64, n: i64) {
         let lanes = on.group.lanes();
         let rows = 2 * self.now.len() * lanes;
         let tally = on.group.tally_mut();
         let first_row = tally.len() - lanes - rows;
-        tally[first_row + rows..].fill(T::default());
+        tally[first_row + rows..].fill(0.0);
         self.states.clear();
         self.states.extend_from_slice(&tally[first_row..first_row + rows]);
         let (v, y) = on.group.slots();
@@ -281,7 +455,7 @@ impl<T: Real> Looks<'_, '_, T> {
         on.group.advance(k, n);
         let (first, h, events) = (on.first, on.h, self.watch.motion.events);
         let may = &on.group.tally()[first_row + rows..];
-        let is_flagged = |lane: &usize| may[*lane] != T::default() || comes(events, first + lane, (k, n, h));
+        let is_flagged = |lane: &usize| may[*lane] != 0.0 || comes(events, first + lane, (k, n, h));
         let flagged: Vec<usize> = (0..on.count).filter(is_flagged).collect();
         self.choose_together(flagged.len() * n as usize, on);
         let mut noticed = Vec::new();
@@ -289,9 +463,8 @@ impl<T: Real> Looks<'_, '_, T> {
             if self.stops[lane].is_some() || on.first_bad[lane] >= 0 {
                 continue;
             }
-            let numbers = |from: usize, every: usize| {
-                self.states[from * lanes..].iter().skip(lane).step_by(every * lanes).map(|x| x.wide())
-            };
+            let numbers =
+                |from: usize, every: usize| self.states[from * lanes..].iter().skip(lane).step_by(every * lanes).copied();
             let (member, events_of_step) = (first + lane, self.now.len());
             noticed.push(Noticed {
                 member,
@@ -310,9 +483,10 @@ impl<T: Real> Looks<'_, '_, T> {
     }
 
     /// Makes steps and keeps the states before each and after the last.
-    fn make_steps(&mut self, on: &mut Stepped<T>, k: i64, n: i64) {
+    fn make_steps(&mut self, on: &mut Stepped<f64>, k: i64, n: i64) {
         self.states.clear();
-        let unrolled = on.group.unrolled(on.spec, on.first, on.count);
+        self.slots.clear();
+        let unrolled = if self.changes() { 0 } else { on.group.unrolled(on.spec, on.first, on.count) };
         let (mut at, lanes) = (k, on.group.lanes());
         let (p, q) = on.rows();
         while at < k + n {
@@ -333,10 +507,13 @@ impl<T: Real> Looks<'_, '_, T> {
         self.keep_state(on, k + n);
     }
 
-    fn keep_state(&mut self, on: &mut Stepped<T>, k: i64) {
+    fn keep_state(&mut self, on: &mut Stepped<f64>, k: i64) {
         if on.carries {
             self.carried.clear();
             self.carried.extend_from_slice(on.group.slots().0);
+            if self.changes() {
+                self.slots.extend_from_slice(&self.carried);
+            }
             on.group.finish(k);
         }
         let (v, y) = on.group.slots();
@@ -348,7 +525,7 @@ impl<T: Real> Looks<'_, '_, T> {
     }
 
     /// Looks for events in the steps that were made.
-    fn look(&mut self, on: &mut Stepped<T>, k: i64, steps: usize) {
+    fn look(&mut self, on: &mut Stepped<f64>, k: i64, steps: usize) {
         let lanes = on.group.lanes();
         let (p, q) = on.rows();
         let block = (p + q) * lanes;
@@ -360,13 +537,7 @@ impl<T: Real> Looks<'_, '_, T> {
                 if row == 0 && self.begun {
                     continue;
                 }
-                tile.row(0).iter_mut().enumerate().for_each(|(lane, t)| {
-                    *t = events.sign * (events.begin.at(first + lane.min(on.count - 1)) + since);
-                });
-                for (i, numbers) in self.states[row * block..(row + 1) * block].chunks_exact(lanes).enumerate() {
-                    let row = tile.row(1 + i);
-                    row.iter_mut().zip(numbers).for_each(|(x, number)| *x = number.wide());
-                }
+                fill(tile, (on, events), &self.states[row * block..(row + 1) * block], since);
                 tile.run();
                 let (now, before) = (&mut self.now[event], &mut self.before[event]);
                 let g = &tile.values[..lanes];
@@ -391,7 +562,7 @@ impl<T: Real> Looks<'_, '_, T> {
         }
         seen.sort_by_key(|each| (each.lane, each.row));
         let state = |lane: usize, row: usize| -> Numbers {
-            self.states[row * block..(row + 1) * block].iter().skip(lane).step_by(lanes).map(|x| x.wide()).collect()
+            self.states[row * block..(row + 1) * block].iter().skip(lane).step_by(lanes).copied().collect()
         };
         let mut candidates = Vec::new();
         for each in seen.chunk_by(|a, b| (a.lane, a.row) == (b.lane, b.row)) {
