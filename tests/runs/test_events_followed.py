@@ -167,12 +167,11 @@ def test_methods_that_carry_something_else_than_v_too(method: str) -> None:
 
 @pytest.mark.parametrize("way", ADAPTIVE_WAYS)
 def test_with_a_tolerance_too(way: str) -> None:
-    """Where the core leaves such a run to the reference's driver, it locates the events."""
     check_the_core_follows_as_the_reference_does(range(20 if way == "three times" else 8), way)
 
 
 def test_no_member_waits_for_others(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Steps with events that change the state are the core's, but in float32 and by series."""
+    """Steps with events that change the state are the core's, but in float32 and of runs with a tolerance that go on."""
     grouped: list[int] = []
     group = driver._Resetting._group
     monkeypatch.setattr(driver._Resetting, "_group", lambda self, *of: grouped.append(1) or group(self, *of))
@@ -188,9 +187,11 @@ def test_no_member_waits_for_others(monkeypatch: pytest.MonkeyPatch) -> None:
     look = adaptive._Resetting.look
     monkeypatch.setattr(adaptive._Resetting, "look", lambda self, *of, **named: looked.append(1) or look(self, *of, **named))
     options = {"v": 0.0, "y": options["y"], "tolerance": 1e-6, "at": [2.0], "events": bounce}
-    assert sw.integrate(driven(f=0.0), "merson", **options).events["bounce"].count.sum() >= 5
+    for method in ("merson", "taylor"):
+        assert sw.integrate(driven(f=0.0), method, **options).events["bounce"].count.sum() >= 5
     assert not looked
-    assert sw.integrate(driven(f=0.0), "taylor", **options).events["bounce"].count.sum() >= 5
+    half = sw.integrate(driven(f=0.0), "merson", **options | {"at": [0.1]})
+    assert sw.integrate(half.system, "merson", resume=half, at=[2.0], events=bounce).events["bounce"].count.sum() >= 5
     assert looked
 
 

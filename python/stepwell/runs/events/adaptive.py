@@ -65,8 +65,9 @@ class AdaptiveRun:
         checks.fits("the events", rows, plan.batch, "keep fewer of each by Event(…, most=…) or split the batch")
         driver = self._begun(plan, pacing, paces)
         looked = driver.sought()
-        # A series is not looked at in the lanes, where its coefficients are.
-        in_lanes = looked is not None and self._keep is None and not plan.method.has_series and driver.goes_in_lanes()
+        # The first step of a series that goes on is made before it is looked at.
+        is_seen = pacing.begins or not plan.method.has_series
+        in_lanes = looked is not None and self._keep is None and is_seen and driver.goes_in_lanes()
         out = driver.made(looked, paces, v, y) if in_lanes and looked is not None else None
         if out is None:
             driver = self._begun(plan, pacing, paces) if in_lanes else driver

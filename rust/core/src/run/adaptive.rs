@@ -4,7 +4,7 @@ mod events;
 
 use std::{ops::Range, sync::Arc};
 
-use self::events::{Looks, length};
+use self::events::{HeldEnd, Looks, length};
 
 use super::{
     adaptive_plan::{Assignment, Part, Status},
@@ -719,10 +719,28 @@ impl<'a> Worker<'a> {
         if assigned.next < self.plan.at.len() || pace.held <= 0.0 {
             return None;
         }
-        let t_end = pace.wall.min(pace.t + pace.h);
-        let t_end = if t_end < pace.wall { t_end } else { self.behind(member, t_end).unwrap_or(t_end) };
-        let (looks, last) = (self.looks.as_mut()?, self.plan.at.last()?);
-        looks.held(&*self.group, lane, member, pace, [t_end, last.at(member)])
+        self.looks.as_ref()?;
+        let (h, state, t) = if self.group.has_terms() {
+            self.end_of_held(lane, member, pace)
+        } else {
+            (length(pace.t, pace.h, pace.wall), None, pace.wall.min(pace.t + pace.h))
+        };
+        let t = if t < pace.wall { t } else { self.behind(member, t).unwrap_or(t) };
+        let h = if state.is_some() { length(t, h, self.wall(member, t)) } else { h };
+        let last = self.last(member);
+        self.looks.as_mut()?.held(&*self.group, lane, member, pace, (HeldEnd { h, t, state }, last))
+    }
+
+    /// The length of a held step of a series, as its end says, the state and the time there; the lane is left as it is.
+    fn end_of_held(&mut self, lane: usize, member: usize, pace: &Pace<f64>) -> (f64, Option<Vec<f64>>, f64) {
+        let (start, scales) = (self.group.state(lane), self.group.scales(lane));
+        self.group.set_pace(lane, Pace { held: 0.0, extra: 0.0, target: f64::INFINITY, ..*pace });
+        self.group.attempt_by_terms(&self.plan.model.spec, lane, member);
+        let (end, state) = (self.group.pace(lane), self.group.state(lane));
+        self.group.set_state(lane, &start);
+        self.group.set_scales(lane, &scales);
+        self.group.set_pace(lane, *pace);
+        (end.h, Some(state), end.t)
     }
 
     /// Ends a member where an event stopped it: in that state, also at all later times. Or it goes on from there, as a run begins.
@@ -743,6 +761,12 @@ impl<'a> Worker<'a> {
             assigned.next = self.plan.at.iter().position(|at| at.at(member) >= stop.t).unwrap_or(times);
             self.group.set_state(lane, &stop.state);
             self.group.set_pace(lane, pace.again());
+            if self.group.has_terms() {
+                let mut scales = self.group.scales(lane);
+                let first = scales.len() - stop.state.len();
+                scales[first..].fill(0.0); // no more digits of this state are known
+                self.group.set_scales(lane, &scales);
+            }
             self.group.begin(&self.plan.model.spec, lane, member);
             let mut scales = self.group.scales(lane);
             let before = self.looks.as_mut().map(|looks| looks.go_on(lane, pace.t)).unwrap_or_default();

@@ -212,6 +212,11 @@ impl<'a> Looks<'a> {
             }
         }
         let mut candidates = Vec::new();
+        if group.has_terms() {
+            // How long a step of a series is follows from its coefficients, which the attempt finds.
+            let [t, h, wall] = [places.t, places.h, places.wall].map(row);
+            made.iter().for_each(|(lane, _)| self.h[*lane] = length(t[*lane], h[*lane], wall[*lane]));
+        }
         if !made.is_empty() {
             self.find_quantities(group);
             self.find_slopes(group, &made);
@@ -273,13 +278,16 @@ impl<'a> Looks<'a> {
         lane: usize,
         member: usize,
         pace: &Pace<f64>,
-        [t_end, end]: [f64; 2],
+        (step_end, end): (HeldEnd, f64),
     ) -> Option<Stop> {
-        let (start, h) = (group.state(lane), length(pace.t, pace.h, pace.wall));
+        let (start, HeldEnd { h, t: t_end, state }) = (group.state(lane), step_end);
         let mut from = States::default();
         from.push(member, pace.t, &start);
         let motion = &mut self.watch.motion;
-        let there = States { t: vec![t_end], ..motion.steps(&from, &[h]) };
+        let mut there = States { t: vec![t_end], ..motion.steps(&from, &[h]) };
+        if let Some(state) = state {
+            there.numbers = state;
+        }
         let mut events = Vec::new();
         for (e, quantity) in self.quantities.iter().enumerate() {
             let [g, next] = [&from, &there].map(|at| motion.quantity(e, at)[0]);
@@ -299,6 +307,14 @@ impl<'a> Looks<'a> {
         let step = Step { member, number, t: pace.t, h, t_end, start: start.into(), end: there.numbers.into(), window };
         self.take(vec![(lane, Candidates { step: Arc::new(step), events })]).pop().map(|(_, stop)| stop)
     }
+}
+
+/// The end of a step that a lane holds.
+pub(super) struct HeldEnd {
+    pub h: f64,
+    pub t: f64,
+    /// The state there, if it is another than that of a trial.
+    pub state: Option<Vec<f64>>,
 }
 
 /// How long a step is that ends at the wall if it would cross it.
