@@ -242,7 +242,7 @@ impl Looks<'_, '_> {
                     break;
                 }
                 for lane in 0..on.count {
-                    self.look_at(on, (k, row), lane, &mut changed);
+                    self.look_at(on, [k, row as i64, until], lane, &mut changed);
                 }
                 if !changed.is_empty() {
                     made = row + 1;
@@ -290,9 +290,10 @@ impl Looks<'_, '_> {
         }
     }
 
-    /// Looks for events in a step of a lane, the `row`-th after the `k`-th, and notes the state that they give its member.
-    fn look_at(&mut self, on: &mut Stepped<f64>, (k, row): (i64, usize), lane: usize, changed: &mut Vec<(usize, Numbers)>) {
-        let (lanes, number, of_run) = (on.group.lanes(), k + row as i64, self.watch.motion.events);
+    /// Looks for events in a step of a lane, the `row`-th after the `k`-th, and notes the state that they give its member. After `until`
+    /// steps it may be saved.
+    fn look_at(&mut self, on: &mut Stepped<f64>, [k, row, until]: [i64; 3], lane: usize, changed: &mut Vec<(usize, Numbers)>) {
+        let (lanes, number, of_run, row) = (on.group.lanes(), k + row, self.watch.motion.events, row as usize);
         let (g, next) = (self.values_of(lanes, lane, row), self.values_of(lanes, lane, row + 1));
         let memory = &mut self.memories[lane];
         if self.stops[lane].is_some() || memory.rests() || on.first_bad[lane] >= 0 {
@@ -319,8 +320,10 @@ impl Looks<'_, '_> {
         let mut each = Followed { memory, state: end, first_bad: None, stop: None };
         if self.watch.look(&mut each, whole, &next) {
             let Followed { memory, state, stop, .. } = each;
-            let until = if memory.rests() { i64::MAX } else { number + 2 };
-            self.given[lane].push(([number + 1, until], state.clone()));
+            if memory.rests() || number + 1 == until {
+                let until = if memory.rests() { i64::MAX } else { until + 1 };
+                self.given[lane].push(([number + 1, until], state.clone()));
+            }
             self.stops[lane] = stop;
             changed.push((lane, state));
         }
