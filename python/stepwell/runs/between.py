@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import prod
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -70,8 +71,7 @@ def states(run: Run, t: Any) -> tuple[Array, Array]:
         outside = times[(way * times < begin) | (way * times > end)][0]
         raise ArgumentError(f"t: expected times within the run, {way * begin:g} to {way * end:g}, got {outside:g}")
     shapes = run.system.v_shape, run.system.y_shape
-    numbers = sum(int(np.prod(shape)) for shape in shapes)
-    checks.fits("the states", numbers * flat.size, batch, "ask for fewer times")
+    checks.fits("the states", sum(map(prod, shapes)) * flat.size, batch, "ask for fewer times")
     saved = [block.reshape(len(block), *shape, total) for block, shape in zip((run.v, run.y), shapes, strict=True)]
     at = [np.empty((flat.size, *shape, total), run.y.dtype) for shape in shapes]
     before = continuation.of(run, stopped=True)

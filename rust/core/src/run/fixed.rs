@@ -2,7 +2,7 @@
 
 mod events;
 
-use std::{sync::Arc, time::Instant};
+use std::{ops::Range, sync::Arc, time::Instant};
 
 use self::events::{Looking, Looks, Stepped};
 
@@ -114,13 +114,15 @@ pub trait Steppable: Traceable {
     ) -> Result<Box<dyn Group<Self>>, Error>;
 
     /// What looks for events in the steps of so many members from `first` on, in so many lanes, which may notice where one may be.
+    /// None where these are not of numbers of 64 bits, as quantities are.
     fn looks<'l, 'a: 'l>(
-        watch: &'l mut Watch<'a>,
-        notices: bool,
-        lanes: usize,
-        first: usize,
-        count: usize,
-    ) -> Option<Box<dyn Looking<Self> + 'l>>;
+        _watch: &'l mut Watch<'a>,
+        _notices: bool,
+        _lanes: usize,
+        _members: Range<usize>,
+    ) -> Option<Box<dyn Looking<Self> + 'l>> {
+        None
+    }
 }
 
 impl Steppable for f64 {
@@ -139,10 +141,9 @@ impl Steppable for f64 {
         watch: &'l mut Watch<'a>,
         notices: bool,
         lanes: usize,
-        first: usize,
-        count: usize,
+        members: Range<usize>,
     ) -> Option<Box<dyn Looking<f64> + 'l>> {
-        Some(Box::new(Looks::new(watch, notices, lanes, first, count)))
+        Some(Box::new(Looks::new(watch, notices, lanes, members.start, members.len())))
     }
 }
 
@@ -156,17 +157,6 @@ impl Steppable for f32 {
         _steps: f64,
     ) -> Result<Box<dyn Group<f32>>, Error> {
         Ok(Box::new(Lanes::<f32>::new(traced, &model.spec, machine.level, members, clock)?))
-    }
-
-    /// Quantities are of numbers of 64 bits.
-    fn looks<'l, 'a: 'l>(
-        _watch: &'l mut Watch<'a>,
-        _notices: bool,
-        _lanes: usize,
-        _first: usize,
-        _count: usize,
-    ) -> Option<Box<dyn Looking<f32> + 'l>> {
-        None
     }
 }
 
@@ -323,7 +313,8 @@ impl<'a, T: Steppable> Worker<'a, T> {
             let count = (members - from).min(group.lanes());
             let (part, checked) = (&mut part, plan.first);
             let notices = plan.model.key.signature.watched.is_some() && !group.tally().is_empty();
-            let looks = watch.as_mut().and_then(|watch| T::looks(watch, notices, group.lanes(), part.first + from, count));
+            let members = part.first + from..part.first + from + count;
+            let looks = watch.as_mut().and_then(|watch| T::looks(watch, notices, group.lanes(), members));
             let mut job = Job { plan, carries, first_piece, group, part, from, count, good: &mut good, checked, looks };
             let ran = job.run(go_on);
             self.good = good;
@@ -475,11 +466,11 @@ impl<T: Real> Job<'_, '_, '_, T> {
         for (lane, given) in looks.given().iter().enumerate() {
             for ([from, until], state) in given {
                 let column = self.from + lane;
-                for i in 0..kept(plan.steps, plan.every) {
-                    let step = plan.first + save(plan.steps, plan.every, i);
-                    if (*from..*until).contains(&step) {
-                        self.write(i, column, state);
-                    }
+                let step = |i: &usize| plan.first + save(plan.steps, plan.every, *i);
+                let first = (from - plan.first).max(0) / plan.every.unwrap_or(1).max(1);
+                let first = if plan.every.is_some() { first as usize } else { 0 };
+                for i in (first..kept(plan.steps, plan.every)).take_while(|i| step(i) < *until).filter(|i| step(i) >= *from) {
+                    self.write(i, column, state);
                 }
                 if *until == i64::MAX {
                     self.part.first_bad[column] = -1;
