@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from typing import Any
 
 import numpy as np
@@ -230,3 +231,51 @@ def test_what_is_between_is_said() -> None:
     with pytest.raises(UnknownNameError, match=r"interpolation: there is no 'lineer'; did you mean 'linear'\?"):
         sw.Sampled([0.0, 1.0], 1.0, interpolation="lineer")  # type: ignore[arg-type]
     assert sw.Sampled([0.0, 1.0], 1.0) != sw.Sampled([0.0, 1.0], 1.0, interpolation="linear")
+
+
+class Interrupted(BaseException):
+    """As Ctrl-C raises one."""
+
+
+@for_each("method", ["standard_heun", "verlet"])
+def test_ctrl_c_between_any_two_lines_leaves_no_trace(method: str) -> None:
+    """A run is interrupted at each line, call and return of what computes its steps; the next one sees the samples of its times.
+
+    As Ctrl-C does in a notebook: where a window was set by one line and reset by another, all later runs saw old samples.
+    """
+    system = sw.Oscillator(a=sw.Sampled([0.0, 1.0, -2.0, 0.5], 0.1))
+    options: dict[str, Any] = {"v": 0.0, "y": 0.0, "dt": 0.1, "steps": 2, "backend": "numpy"}
+    expected = sw.integrate(system, method, **options).y
+    places = ("signal.py", "context.py", "contextlib.py", "contact.py", "trace.py")
+    count = 0
+
+    def run(stop: int) -> bool:
+        """Whether it ended before so many events."""
+        nonlocal count
+        count = 0
+
+        def traced(frame: Any, event: str, _: Any) -> Any:
+            nonlocal count
+            if not frame.f_code.co_filename.endswith(places):
+                return None
+            count += 1
+            if count == stop:
+                raise Interrupted
+            return traced
+
+        before = sys.gettrace()
+        sys.settrace(traced)
+        try:
+            sw.integrate(system, method, **options)
+        except Interrupted:
+            return False
+        finally:
+            sys.settrace(before)
+        return True
+
+    stop = 1
+    while not run(stop):
+        np.testing.assert_array_equal(sw.integrate(system, method, **options).y, expected)
+        assert signal._WINDOW.get() is None
+        stop += 1
+    assert stop > 100  # all of its events were tried

@@ -370,8 +370,8 @@ def step(steps: Any, s: Any, choice: int, t: Any, h: Any, v: Any, y: Any, *kept:
     What a method carries or keeps begins anew where a point met a surface.
     """
     before = v, y
-    with over(of_step(t, h, hasattr(steps, "finish"))):
-        *after, kept_now = _with_kept(whole_step(steps.step, s, t, h, v, y, *kept))
+    window = of_step(t, h, hasattr(steps, "finish"))
+    *after, kept_now = _with_kept(over(window, whole_step, steps.step, s, t, h, v, y, *kept))
     if not getattr(s, "met", None):
         return *after, *kept_now
     end, (slot, y1) = t + h, after

@@ -62,7 +62,7 @@ def linear_step(
     pq = np.concatenate([p, np.moveaxis(q, 0, 1)], axis=1)
 
     def step(t: float, s: Array) -> Array:
-        with over(of_step(t, h, carries)):
-            return times(pq, [*s, *(signal.at(t + later) for later, signal in columns)], fused=fused)
+        seen = over(of_step(t, h, carries), lambda: [signal.at(t + later) for later, signal in columns])
+        return times(pq, [*s, *seen], fused=fused)
 
     return step

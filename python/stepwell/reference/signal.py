@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from contextvars import ContextVar
 from copy import copy
 from typing import Any
@@ -11,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..base.arrays import Array
+from ..base.context import within
 from . import bits, trig
 
 #: By this factor the number of intervals since the first sample is taken longer: rounding may put it just before a whole number.
@@ -23,14 +23,9 @@ Window = tuple[Any, Any, Any]
 _WINDOW: ContextVar[Window | None] = ContextVar("window", default=None)
 
 
-@contextmanager
-def over(window: Window) -> Iterator[None]:
-    """What is computed within sees the mean of held samples over a stretch of time."""
-    before = _WINDOW.set(window)
-    try:
-        yield
-    finally:
-        _WINDOW.reset(before)
+def over(window: Window, compute: Callable[..., Any], /, *arguments: Any) -> Any:
+    """``compute(*arguments)``, which sees the mean of held samples over a stretch of time."""
+    return within({_WINDOW: window}, compute, *arguments)
 
 
 def _ways(h: Any) -> tuple[Any, Any]:

@@ -149,10 +149,10 @@ class Tracer:
             _array(shapes[of_v], more)
         memory = self._memory(more)
         s = self._looped(h, memory)[0] if memory else self.scaled(h)
-        with over(of_slot(t, h)):
-            if method.kept:
-                return self.flat(v, y, *method.steps.start(s, choice, t, h, v, y), *memory)
-            return self.flat(getattr(method.steps, which)(s, choice, t, v, y), y)
+        window, compute = of_slot(t, h), getattr(method.steps, which)
+        if method.kept:
+            return self.flat(v, y, *over(window, compute, s, choice, t, h, v, y), *memory)
+        return self.flat(over(window, compute, s, choice, t, v, y), y)
 
     def attempted(self, *, backward: bool = False) -> adaptive.Attempted:
         """How an attempt at an adaptive step uses the system."""

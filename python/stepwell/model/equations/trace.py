@@ -14,6 +14,7 @@ import numpy as np
 from ...base import checks
 from ...base.arrays import Array as Numbers
 from ...base.arrays import Shape
+from ...base.context import within
 from ...errors import REFUSED, TraceError
 from ...reference.bits import less, where
 from ...reference.mass import Mass, combined
@@ -263,16 +264,12 @@ class Equations:
 def run_function(function: Callable[..., Any], name: str, quick_sines: bool, /, *arguments: Any, **parameters: Any) -> Any:
     """Call a user's function. An error is raised again with its name and the line, even if the function itself catches it."""
     refused: list[TraceError] = []
-    before, outer = QUICK_SINES.set(quick_sines), REFUSED.set(refused)
     try:
-        result = function(*arguments, **parameters)
+        result = within({QUICK_SINES: quick_sines, REFUSED: refused}, function, *arguments, **parameters)
     except RecursionError:
         raise
     except Exception as error:
         raise _located(error, function, name) from error
-    finally:
-        REFUSED.reset(outer)
-        QUICK_SINES.reset(before)
     if refused:
         raise _located(refused[0], function, name) from refused[0]
     return result

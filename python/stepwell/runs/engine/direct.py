@@ -131,8 +131,7 @@ def to_velocity(plan: Plan) -> reference.Velocity | None:
     s, finish = plan.scaled(), plan.method.steps.finish
 
     def velocity(t: float, slot: Array, y: Array) -> Array:
-        with over(of_slot(t, plan.dt)):
-            return np.asarray(finish(s, plan.choice, t, slot, y))
+        return np.asarray(over(of_slot(t, plan.dt), finish, s, plan.choice, t, slot, y))
 
     return velocity
 
@@ -173,13 +172,11 @@ def to_slot(plan: Plan, v: Array, y: Array) -> Array:
                 before = [*rows_of(plan, v, y), *[np.zeros(plan.batch)] * (plan.slot_numbers - n_v), *memory]
                 rows = evaluated(plan, "start")(before, t)
                 return np.concatenate([rows[:n_v], rows[n_v + n_y : n_y + plan.slot_numbers]])
-            with over(of_slot(t, plan.dt)):
-                begun: Any = plan.method.steps
-                return _joined(plan, [v, *begun.start(_begun(plan), plan.choice, t, plan.dt, v, y)])
+            steps: Any = plan.method.steps
+            return _joined(plan, [v, *over(of_slot(t, plan.dt), steps.start, _begun(plan), plan.choice, t, plan.dt, v, y)])
         if plan.by_tape:
             return evaluated_slot(plan, "start")(t, v, y)
-        with over(of_slot(t, plan.dt)):
-            return np.asarray(plan.method.steps.start(plan.scaled(), plan.choice, t, v, y))
+        return np.asarray(over(of_slot(t, plan.dt), plan.method.steps.start, plan.scaled(), plan.choice, t, v, y))
 
 
 def _begun(plan: Plan) -> Any:

@@ -277,17 +277,14 @@ def stepped(plan: engine.Plan, s: Any, t: Any, h: Any, v: Any, y: Any) -> tuple[
     steps: Any = plan.method.steps
     s.axes = plan.block_axes  # behind these are those of members, each with a length of its own
     if plan.method.kept:
-        with over(of_slot(t, h)):
-            kept = steps.start(s, plan.choice, t, h, v, y)
+        kept = over(of_slot(t, h), steps.start, s, plan.choice, t, h, v, y)
         v, y, *_ = contact.step(steps, s, plan.choice, t, h, v, y, *kept)
         return v, y
     if plan.method.carry is None:
         return tuple(contact.step(steps, s, plan.choice, t, h, v, y))
-    with over(of_slot(t, h)):
-        slot = steps.start(s, plan.choice, t, v, y)
+    slot = over(of_slot(t, h), steps.start, s, plan.choice, t, v, y)
     slot, y = contact.step(steps, s, plan.choice, t, h, slot, y)
-    with over(of_slot(t + h, h)):
-        return steps.finish(s, plan.choice, t + h, slot, y), y
+    return over(of_slot(t + h, h), steps.finish, s, plan.choice, t + h, slot, y), y
 
 
 def within(plan: engine.Plan, system: Attempted, t: Any, h: Any, v: Any, y: Any) -> tuple[Any, Any]:
