@@ -175,3 +175,34 @@ def test_a_large_state_has_the_same_jacobian_by_the_complex_step() -> None:
     # Each element is a sum of twenty of size 1/0.3² at most, with some twenty roundings each.
     np.testing.assert_allclose(jacobian.matrix.reshape(-1), values[:6400], rtol=0, atol=40 * EPS * 20 / 0.09)
     np.testing.assert_allclose(jacobian.rates, values[6400:], rtol=0, atol=40 * EPS * 20 / 0.3)
+
+
+def test_equal_operations_are_derived_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """With other numbers and inputs, too; a function that reads another number of its own is derived again."""
+    known: dict[str, Any] = {}
+    derived: list[int] = []
+    derive = traced.jacobian
+    monkeypatch.setattr(traced, "_jacobians", known)
+    monkeypatch.setattr(traced, "jacobian", lambda *arguments: derived.append(1) or derive(*arguments))
+    stiffness = 2.0
+
+    @sw.system
+    def spring(t: Any, v: Any, y: Any, *, c: Any = 0.1, u: Any = 0.0) -> Any:
+        return u - stiffness * np.sin(y) - c * v
+
+    def slopes(**numbers: Any) -> Any:
+        return sw.jacobian(spring(**numbers), v=0.0, y=0.5).matrix
+
+    for c in (0.1, 0.2, 0.3):
+        np.testing.assert_array_equal(slopes(c=c), [[-c, -2.0 * np.cos(0.5)], [1.0, 0.0]])
+    assert len(derived) == 1
+    for first in (1.0, -1.0):  # what an input is does not change its operations, and it has its own samples
+        slopes(u=sw.Sampled([first, 0.0], 0.1))
+    assert len(derived) == 2
+    stiffness = 3.0  # a constant on the tape
+    np.testing.assert_array_equal(slopes()[0, 1], -3.0 * np.cos(0.5))
+    assert len(derived) == 3
+    for _ in range(traced.MAX_CACHED):
+        stiffness += 1.0
+        slopes()
+    assert len(known) <= traced.MAX_CACHED

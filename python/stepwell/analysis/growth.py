@@ -128,13 +128,14 @@ def growth(
     suspects = np.flatnonzero(many)[: MOST_NUMBERS // (n * n)]
     try:
         factors = _Factors(system, method, dt, t, start, many.shape)
-        radius, rate = factors.of(suspects)
+        radius = factors.radius(suspects)
+        # The quotient may overflow; its logarithm does not.
+        grown = np.log(after.reshape(-1)[suspects]) - np.log(before.reshape(-1)[suspects])
+        by_steps = np.flatnonzero(steps * np.log(np.maximum(radius, 1.0)) >= BY_STEPS * grown)
+        if by_steps.size:
+            by_steps = by_steps[factors.rate(suspects[by_steps]) * steps <= BY_MOTION * grown[by_steps]]
     except UnsupportedError:
         return None
-    # The quotient may overflow; its logarithm does not.
-    grown = np.log(after.reshape(-1)[suspects]) - np.log(before.reshape(-1)[suspects])
-    expected = steps * np.log(np.maximum(radius, 1.0))
-    by_steps = np.flatnonzero((expected >= BY_STEPS * grown) & (rate * steps <= BY_MOTION * grown))
     if not by_steps.size:
         return None
     k = by_steps[0]
@@ -171,17 +172,21 @@ class _Factors:
         own, v, y = self._batch.of(members)
         return own, self._t if np.ndim(self._t) == 0 else self._t[members], v, y
 
-    def of(self, members: Whole) -> tuple[Array, Array]:
-        """For each member the spectral radius of a step, and the largest growth exponent of its rates over a step."""
+    def radius(self, members: Whole) -> Array:
+        """For each member the spectral radius of a step."""
         from .stability import eigen, maps
 
         (own, t, v, y), dt = self._own(members), np.asarray(self._dt if self._each is None else self._each[members])
-        rates = maps.rates(own, t, v, y)
         step = maps.transition(own, self._method, dt) if v is None or y is None else maps.jacobian(own, self._method, dt, t, v, y)
-        exponents = eigen.eigenvalues(rates).real
-        radius = np.abs(eigen.eigenvalues(step)).max(axis=0)
-        rate = (dt * exponents).max(axis=0) if self._each is None else dt * exponents.max(axis=0)
-        return np.broadcast_to(radius, members.shape), np.broadcast_to(rate, members.shape)
+        return np.broadcast_to(np.abs(eigen.eigenvalues(step)).max(axis=0), members.shape)
+
+    def rate(self, members: Whole) -> Array:
+        """For each member the largest growth exponent of its rates over a step."""
+        from .stability import eigen, maps
+
+        (own, t, v, y), dt = self._own(members), self._dt if self._each is None else self._each[members]
+        exponents = eigen.eigenvalues(maps.rates(own, t, v, y)).real
+        return np.broadcast_to((dt * exponents).max(axis=0) if self._each is None else dt * exponents.max(axis=0), members.shape)
 
     def step(self, member: int) -> float:
         """The step of a member."""

@@ -103,13 +103,15 @@ def gain(of: Any, blocks: Sequence[Sequence[Array]], least: float) -> About | No
         return None
     with np.errstate(all="ignore"):
         alone = system.reference_at_step(1.0, y.shape[2:])
-        _, kinetic, energy = alone.energies(v, y)
+        kinetic, energy = alone.kinetic_and_whole(v, y)
+        first, most = energy[0], energy.max(axis=0)
+        known = kinetic.max(axis=0) if least < 1.0 else kinetic[0]
+        if not (most - first > least * known).any():  # which spares the rest, for nearly all runs
+            return None
         moved = (y.max(axis=(0, 2)) - y.min(axis=(0, 2))).max(axis=0)
         weight = np.broadcast_to(alone.masses, (system.n, *alone.masses.shape[1:])).sum(axis=0)
         pull = 0.0 if alone.fall is None else (weight * np.sqrt((alone.fall * alone.fall).sum(axis=0)))[0]
         stretched = (0.5 * alone.stiffness * alone.stretches(y[:, :, :1]) ** 2).sum(axis=0)[0]
-        first, most = energy[0], energy.max(axis=0)
-        known = kinetic.max(axis=0) if least < 1.0 else kinetic[0]
         wrong = np.asarray((most - first > least * np.maximum(known, stretched + pull * moved)) & np.isfinite(most))
     if not wrong.any():
         return None

@@ -47,9 +47,12 @@ def total(values: Array) -> Array:
     """The sum over the first axis: body i in part i mod LANES, then part after part; zero without bodies."""
     if not len(values):
         return np.zeros(values.shape[1:], values.dtype)
-    parts = [values[lane] for lane in range(min(LANES, len(values)))]
-    for i in range(LANES, len(values)):
-        parts[i % LANES] = parts[i % LANES] + values[i]
+    whole_rows = len(values) // LANES * LANES
+    parts, rest = values, values[whole_rows:]
+    if whole_rows:
+        # Not a sum, which NumPy may take in any order.
+        parts = np.add.accumulate(values[:whole_rows].reshape(-1, LANES, *values.shape[1:]))[-1]
+        parts = np.concatenate([parts[: len(rest)] + rest, parts[len(rest) :]]) if len(rest) else parts
     whole: Array = parts[0]
     for part in parts[1:]:
         whole = whole + part

@@ -1,5 +1,6 @@
 """Particles joined by springs, in one to three dimensions."""
 
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -63,12 +64,17 @@ class Springs(Recorded):
         self.force_at_rest = stiffness * rest
         ends = numbers_of(pairs).reshape(-1, 2)
         self.i, self.j = ends.T
-        self.fixed = fixed_ones = numbers_of(fixed)
-        self.free = np.delete(np.arange(n), fixed_ones)
-        self.rounds = in_order(ends, fixed_ones)
+        self.fixed = numbers_of(fixed)
+        self.free = np.delete(np.arange(n), self.fixed)
+        self.ends = ends
         self.by_mass = h / masses
         self.fall = None if gravity is None else h * gravity
         self.slowing = None if drag is None else self.by_mass * drag
+
+    @cached_property
+    def rounds(self) -> list[Ends]:
+        """The springs in the order in which a particle's forces are summed."""
+        return in_order(self.ends, self.fixed)
 
     def across(self, places: Array) -> Array:
         """From the first end of each spring to the second, shape (springs, dim, …)."""
@@ -127,6 +133,10 @@ class Springs(Recorded):
 
     def energies(self, v: Array, y: Array) -> tuple[Array, Array, Array]:
         """h·v̇, h times the kinetic energy of what moves, and h times the whole energy."""
+        return self.dv(0.0, v, y), *self.kinetic_and_whole(v, y)
+
+    def kinetic_and_whole(self, v: Array, y: Array) -> tuple[Array, Array]:
+        """The kinetic energy of what moves and the whole energy, both times h."""
         half = 0.5 * self.h
         kinetic = total((half * self.of_free(self.masses)) * square(v[self.free]))
         stretch = self.stretches(y)
@@ -136,7 +146,7 @@ class Springs(Recorded):
             for c in range(1, y.shape[1]):
                 along = along + self.fall[c] * y[self.free, c]
             whole = whole - total(self.of_free(self.masses) * along)
-        return self.dv(0.0, v, y), kinetic, whole
+        return kinetic, whole
 
     def gradient(self, v: Array, y: Array, dv: Array) -> tuple[Array, Array, Array]:
         """The gradient of the energy, m·v in the velocities and −m·v̇ in the coordinates, and the square of its length."""
@@ -149,7 +159,7 @@ class Springs(Recorded):
 
 def energy(s: Springs, v: Array, y: Array) -> Array:
     """½·Σ m·v² − Σ m·g·y of what moves, and ½·Σ k·(ℓ − ℓ₀)²."""
-    return s.energies(v, y)[2] / s.h
+    return s.kinetic_and_whole(v, y)[1] / s.h
 
 
 def momentum(s: Springs, v: Array, y: Array) -> Array:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 import operator
 from collections.abc import Mapping, Sequence
+from copy import copy
 from typing import Any
 
 import numpy as np
@@ -56,6 +57,12 @@ class Evaluation:
         self._numbers = {i: np.asarray(each, dtype=np.float32) for i, each in numbers.items()} if tape.single else numbers
         self.length = len(lines)
         self._run = compiled(lines, places, tape.single)
+
+    def of(self, numbers: Mapping[int, Any], tables: Sequence[Any]) -> Evaluation:
+        """The same with other parameters and inputs, of a tape of float64."""
+        other = copy(self)
+        other._numbers, other._tables = numbers, tables
+        return other
 
     def __call__(self, state: Sequence[Array], t: Any = 0.0, h: Any = 1.0) -> list[Any]:
         """The values for these numbers of the state, each of a shape that broadcasts to the members, at time t and step h."""
