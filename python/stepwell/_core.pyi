@@ -164,6 +164,9 @@ class World:
     def step(self, n: int = 1) -> bool:
         """Make steps; whether a number of the state is not finite then, if that was looked at."""
 
+    def step_and_look(self, n: int, events: object) -> tuple[bool, object]:
+        """The same with events, of float64; and what was found, as by ``run_and_look``."""
+
     def carry(self) -> NDArray[Any] | None: ...
     def carry_on(self, carry: NDArray[Any]) -> None:
         """Go on with this carry, by rows, which belongs to what is in the arrays now."""

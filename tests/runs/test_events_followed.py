@@ -83,14 +83,20 @@ ADAPTIVE_WAYS: dict[str, dict[str, Any]] = {
 
 
 def drawn(number: int, backend: str, way: str | None = None, known: bool = False, carrying: str | None = None) -> sw.Run:
-    """A run with one to three of these events, from starts with one decimal place, some of them at an event.
+    """A run with one to three of these events, from starts with one decimal place, some of them at an event."""
+    system, method, options = drawn_options(number, way, known, carrying)
+    return sw.integrate(system, method, backend=backend, **options)
 
-    With some at known times among them, if ``known``; ``carrying`` is a method that carries something else than v.
-    """
+
+def drawn_options(
+    number: int, way: str | None, known: bool, carrying: str | None, members: int | None = None
+) -> tuple[sw.System, str, dict[str, Any]]:
+    """Its arguments: with events at known times, if ``known``; ``carrying`` is a method that carries something else than v."""
     random = np.random.default_rng([13, number])
     pool = (OF_COORDINATES, OF_A_PLACE)[number % 2]
     events = [pool[name]() for name in random.choice(list(pool), size=random.integers(1, 4), replace=False)]
     n, dt, every = int(random.choice([1, 3, 9])), float(random.choice([0.01, 0.1, 0.3])), random.choice([None, 1, 5])
+    n = members or n
     options: Any = {"dt": dt, "steps": int(random.choice([7, 30])), "every": None if every is None else int(every)}
     if known:
         thens = (lambda t, y: [y[0] + 0.5, y[1]]), (lambda t, v, y: (v + 0.5, y))
@@ -110,7 +116,7 @@ def drawn(number: int, backend: str, way: str | None = None, known: bool = False
     if way is not None:
         states = {name: options[name] for name in ("v", "y") if name in options}
         options = {**states, "tolerance": 1e-5, **ADAPTIVE_WAYS[way]}
-    return sw.integrate(system, carrying or method, events=events, backend=backend, **options)
+    return system, carrying or method, options | {"events": events}
 
 
 def check_the_core_follows_as_the_reference_does(numbers: range, way: str | None = None, known: bool = False) -> None:
@@ -168,6 +174,93 @@ def test_methods_that_carry_something_else_than_v_too(method: str) -> None:
 @pytest.mark.parametrize("way", ADAPTIVE_WAYS)
 def test_with_a_tolerance_too(way: str) -> None:
     check_the_core_follows_as_the_reference_does(range(20 if way == "three times" else 8), way)
+
+
+def worlds(number: int, known: bool, carrying: str | None) -> list[sw.World]:
+    """Two worlds that are made alike, the first with events in the core; a fifth of them have several groups of members."""
+    members = 300 if number % 5 == 4 else None
+    system, method, options = drawn_options(number, None, known, carrying, members)
+    events = [each for each in options["events"] if not each.terminal]
+    y = options["y"]
+    v = options["v"] if number % 2 else np.zeros((0, y.shape[-1]))
+    both = [sw.World(system, method, v=v.copy(), y=y.copy(), dt=options["dt"], events=events) for _ in range(2)]
+    both[1]._frames._by_core = False
+    return both
+
+
+def assert_same_state(world: sw.World, v: Any, y: Any) -> None:
+    np.testing.assert_array_equal(world.v, v)
+    np.testing.assert_array_equal(world.y, y)
+
+
+@pytest.mark.parametrize("carrying", [None, *CARRYING])
+def test_worlds_are_runs_in_pieces(carrying: str | None) -> None:
+    """To the bit; and from a state that is written for all members, runs that begin there."""
+    occurred, rested = 0, 0
+    drawings = [each for each in range(40) if each not in CHATTERING and (carrying is None or each % 2)]
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        for number, known in itertools.product(drawings, (False, True)):
+            world, begins, heard = worlds(number, known, carrying)[0], 0, 0
+            for pieces in ((1, 2, 0, 1, 7, 1, 3, 7), (1, 1, 8)):
+                options = {"dt": world.dt, "start_step": begins, "steps": sum(pieces), "events": world._events, "every": 1}
+                run = sw.integrate(world.system, world.method, v=world.v, y=world.y, **options)
+                for n in pieces:
+                    world.step(n)
+                    assert_same_state(world, *(each[world.step_number - begins] for each in (run.v, run.y)))
+                    heard += sum(int(each.count.sum()) for each in world.events.values())
+                begins, occurred = world.step_number, occurred + sum(int(each.count.sum()) for each in run.events.values())
+                rested += int(np.sum(run.status == sw.Status.REST))
+                world.y[...] += np.random.default_rng(number).normal(size=world.y.shape)
+            assert world._frames._by_core or not world._events
+    assert heard > 0
+    assert occurred > 10 * len(drawings)
+    assert rested > 0
+
+
+def test_worlds_hear_what_is_written_between_calls() -> None:
+    """A state of one member, or a parameter: the core goes on as Python does."""
+    occurred = 0
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        for number, known in itertools.product((each for each in range(40) if each not in CHATTERING), (False, True)):
+            random, both = np.random.default_rng([15, number]), worlds(number, known, None)
+            for _ in range(12):
+                n, moved, kind = int(random.choice([0, 1, 1, 2, 7])), int(random.integers(both[0].y.shape[-1])), random.random()
+                for world in both:
+                    if kind < 0.15:
+                        world.y[..., moved] = np.round(world.y[..., moved], 1)
+                    elif kind < 0.25:
+                        world.v[..., moved] = 0.5
+                    elif kind < 0.35:
+                        world.set(w=float(moved) + 0.5)
+                    world.step(n)
+                assert_same_state(both[0], both[1].v, both[1].y)
+                assert both[0].events == both[1].events, number
+                occurred += sum(int(each.count.sum()) for each in both[0].events.values())
+    assert occurred > 1000
+
+
+@pytest.mark.parametrize("backend", ["rust", "numpy"])
+def test_a_kick_at_the_end_of_a_step_wakes_what_is_at_rest(backend: Any) -> None:
+    """9 · 0.3 is just below 2.7, where the tenth step begins, so that the kick is in it; 3.0 − 0.3 is 2.7."""
+    kick = sw.Event(times=2.7, then=lambda t, v, y: (v + 1.0, y), name="kick")
+    falls = sw.system(order=2)(lambda t, v, y: -1.0 + 0.0 * y)()
+    floor = sw.Event(lambda t, v, y: y, direction=-1, then=lambda t, v, y: (np.maximum(v, 0.0), np.maximum(y, 0.0)), name="floor")
+    options: dict[str, Any] = {"v": 0.0, "y": 0.0, "dt": 0.3, "events": [floor, kick]}
+    adaptive_steps = {name: each for name, each in options.items() if name != "dt"} | {"tolerance": 1e-9, "at": [3.6]}
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        run = sw.integrate(falls, "rk4", steps=12, backend=backend, **options)
+        same = sw.integrate(falls, "merson", backend=backend, **adaptive_steps)
+    for each in (run, same):
+        assert each.events["kick"].t.tolist() == [2.7]
+        assert each.y[-1] == pytest.approx(0.9 * (1.0 - 0.45), abs=1e-12)
+    if backend == "rust":
+        world = sw.World(falls, "rk4", **options | {"v": np.zeros(()), "y": np.zeros(())})
+        for _ in range(12):
+            world.step()
+        assert_same_state(world, run.v[-1], run.y[-1])
 
 
 def test_no_member_waits_for_others(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -271,7 +364,12 @@ def test_what_begins_at_an_event_that_turns_nothing_back_goes_through(backend: A
         run = sw.integrate(falls, method, v=0.0, y=0.0, events=line, backend=backend, **steps)
         assert (run.status, run.events["line"].count) == (sw.Status.OK, 0)
         np.testing.assert_allclose((run.v[-1], run.y[-1]), (-6.0, -18.0), rtol=1e-12)
-    ground = sw.Event(lambda t, v, y: y, direction=-1, then=lambda t, v, y: (-0.9 * v, y))
-    with pytest.warns(sw.EventWarning, match="came to rest .* at t = 0"):
-        run = sw.integrate(falls, method, v=0.0, y=0.0, events=ground, backend=backend, **steps)
-    assert (run.v[-1], run.y[-1], run.status) == (0.0, 0.0, sw.Status.REST)
+    for then in (
+        lambda t, v, y: (-0.9 * v, y),
+        lambda t, v, y: (np.maximum(v, 0.0), np.maximum(y, 0.0)),
+        lambda t, v, y: (0.0 * v, y),
+    ):
+        ground = sw.Event(lambda t, v, y: y, direction=-1, then=then)
+        with pytest.warns(sw.EventWarning, match="came to rest .* at t = 0"):
+            run = sw.integrate(falls, method, v=0.0, y=0.0, events=ground, backend=backend, **steps)
+        assert (run.v[-1], run.y[-1], run.status) == (0.0, 0.0, sw.Status.REST)

@@ -20,6 +20,7 @@ use stepwell_core::{
 };
 
 use crate::{
+    events::{AllFound, EventsOf, found},
     interruptible, listen,
     model::{ModelSpec, argument_error, by_row, core_error, error_of, in_use},
 };
@@ -223,6 +224,8 @@ struct Loop<T: Of> {
     live: Option<Live>,
     /// Steps since it was last checked whether the state is finite.
     unchecked: i64,
+    /// What is known of its members, if events are looked for.
+    between: world::Between,
 }
 
 impl<T: Of> Loop<T> {
@@ -251,12 +254,12 @@ impl<T: Of> Loop<T> {
         } else {
             Arrays::Many { v, y }
         };
-        Ok(Loop { world, arrays, force, live: None, unchecked: 0 })
+        Ok(Loop { world, arrays, force, live: None, unchecked: 0, between: Default::default() })
     }
 
     /// `n` steps; long calls let other threads run and check for Ctrl-C. Whether a number of the state is not finite then.
     fn advance(&mut self, py: Python<'_>, mut n: i64, at: &AtomicI64, changes: &AtomicI64) -> PyResult<bool> {
-        let Loop { world, arrays, force, live, unchecked } = self;
+        let Loop { world, arrays, force, live, unchecked, .. } = self;
         // To check many numbers takes a part of the time of a step.
         *unchecked += if matches!(arrays, Arrays::Few { .. }) { STEPS_PER_CHECK } else { n };
         let checks = *unchecked >= STEPS_PER_CHECK;
@@ -289,6 +292,36 @@ impl<T: Of> Loop<T> {
             at.store(world.step_number(), Relaxed);
             Ok(checks && !world::are_finite(v, y))
         })
+    }
+}
+
+impl Loop<f64> {
+    /// `n` steps with events.
+    fn advance_and_look(
+        &mut self,
+        py: Python<'_>,
+        n: i64,
+        events: &EventsOf<'_>,
+        (at, changes): (&AtomicI64, &AtomicI64),
+    ) -> PyResult<(bool, AllFound)> {
+        let Loop { world, arrays, force, live, between, .. } = self;
+        if let Some(live) = live {
+            live.read(py, world, changes)?;
+        }
+        if let Some(force) = force {
+            force.read(py, world)?;
+        }
+        let (events, mut heard) = (events.of_core(world.members())?, Ok(()));
+        let bad = arrays.with(py, |v, y| {
+            world.step_and_look(n, [&mut *v, &mut *y], &events, between, &mut || {
+                heard = listen(py);
+                heard.is_ok()
+            });
+            Ok(!world::are_finite(v, y))
+        });
+        at.store(world.step_number(), Relaxed);
+        heard?;
+        Ok((bad?, found(py, &events)))
     }
 }
 
@@ -418,6 +451,14 @@ impl World {
         self.alone(|of| match of {
             Loops::Double(of) => of.advance(py, n, &self.step, &self.changes),
             Loops::Single(of) => of.advance(py, n, &self.step, &self.changes),
+        })
+    }
+
+    /// `n` steps with events, in place. Whether a number of the state is not finite then, and what was found.
+    fn step_and_look(&self, py: Python<'_>, n: i64, events: EventsOf<'_>) -> PyResult<(bool, AllFound)> {
+        self.alone(|of| match of {
+            Loops::Double(of) => of.advance_and_look(py, n, &events, (&self.step, &self.changes)),
+            Loops::Single(_) => Err(argument_error("events of float32 are looked for by Python".to_owned())),
         })
     }
 

@@ -388,7 +388,7 @@ class _Resetting(_Driver):
             self._changes[index] = np.where(anew, 0, self._changes[index] + 1)
             often = (self._changes[index] > MOST_IN_A_STEP) & ~(settled | in_no_time | circles)
             self._resets.often_since[index[often]] = self._recent[index[often]]
-            rests = (settled | in_no_time | circles | often) & ~stops
+            rests = (settled | in_no_time | circles | often) & ~stops & (event >= 0)
             limit = np.where(settled, rest_of_series, 0.0)
             self._flight[index], self._ratio[index] = flight, ratio
             for block, earlier in zip((v, y), self._state, strict=True):
@@ -407,7 +407,7 @@ class _Resetting(_Driver):
 
         It is seen at some times, evenly apart, and at jumps, whether it does.
         """
-        looked = np.flatnonzero((self._rests[index] >= 0) & self._resets.led_back[self._rests[index], index])
+        looked = np.flatnonzero(self._resets.may_go_on(self._rests, index))
         free, wakes = np.zeros((2, len(index)), dtype=bool)
         for place in looked:
             member = index[place : place + 1]

@@ -305,17 +305,17 @@ class _Resetting(_Driver):
 
     def _wait(self, index: Whole, v: Array, y: Array, done: int) -> None:
         """Go on later with members at rest, from the first step at whose end the event that holds them does so no longer."""
-        plan, held = self.plan, np.flatnonzero((self.rests[index] >= 0) & self.resets.led_back[self.rests[index], index])
+        plan, held = self.plan, np.flatnonzero(self.resets.may_go_on(self.rests, index))
         h = np.full(len(index), plan.dt)
         while len(held) and done < plan.steps:
             steps = min(max(1, NUMBERS_AT_ONCE // (len(held) * max(1, len(v) + len(y)))), MOST_STEPS, plan.steps - done)
-            t = plan.t0_of(index[held]) + (plan.first + done + 1 + np.arange(steps)[:, np.newaxis]) * plan.dt
-            places = np.tile(held, steps)
-            t = np.broadcast_to(t, (steps, len(held))).reshape(-1)
+            places, numbers = np.tile(held, steps), plan.first + done + np.arange(steps)[:, np.newaxis]
+            t0, of_all = plan.t0_of(index[held]), (steps, len(held))
+            starts, t = (np.broadcast_to(t0 + (numbers + later) * plan.dt, of_all).reshape(-1) for later in (0, 1))
             state = v[..., places], y[..., places]
             holds = self.resets.holds(self.rests[index[places]], index[places], t, h[places], *state)
             for _, timed in self.timed:
-                holds &= timed.after(index[places], self.way * (t - plan.dt))[0] > self.way * t
+                holds &= timed.after(index[places], self.way * starts)[0] > self.way * t
             holds = holds.reshape(steps, len(held))
             first = np.where(holds.all(axis=0), steps, np.argmin(holds, axis=0))
             for step in np.unique(first[first < steps]):

@@ -13,6 +13,7 @@ from ...base.arrays import Array, Whole
 from ...errors import UnsupportedError
 from .. import engine
 from ..occurrences import Occurrences
+from . import by_core
 from .collected import Collected
 from .event import Event
 from .members import Members
@@ -58,10 +59,14 @@ class Frames(Collected):
         #: The events at which members are at rest, −1 for others; and the state and quantities after the last call.
         self._rests = np.full(plan.members, -1)
         self._left: tuple[list[Array], list[Array]] | None = None
+        #: Whether the core looks for events; what it looks for, None where that has changed; and the force that it knows.
+        self._by_core = self._resets is None or not plan.method.kept
+        self._sought: by_core.Sought | None = None
+        self._force: Array | None = None
 
     def renew(self, plan: engine.Plan) -> None:
         """Go on with other parameters."""
-        self.plan, self.members = plan, Members(plan)
+        self.plan, self.members, self._sought = plan, Members(plan), None
         self.trials = Trials(plan, self.members)
 
     def step(self, n: int = 1) -> bool:
@@ -75,6 +80,11 @@ class Frames(Collected):
         for _, timed in self.timed:
             if not timed.covers(begin, begin + n * self.plan.dt):
                 timed.cover(begin, begin + max(n, STEPS_AHEAD) * self.plan.dt)
+                self._sought = None
+        if self._by_core and (sought := self._looked_for()) is not None:
+            diverged, found = self._loop.step_and_look(n, sought)
+            by_core.take(self, found)
+            return diverged
         g = self._quantities(self._loop.step_number)
         self._start_from(g)
         for _ in range(n):
@@ -91,6 +101,23 @@ class Frames(Collected):
             self.locate_waiting(e)
         self._left = [each.copy() for each in self._blocks], g
         return not all(np.isfinite(each).all() for each in self._blocks)
+
+    def _looked_for(self) -> by_core.Sought | None:
+        """What the core looks for; None if it cannot, which stays so."""
+        force = self.plan.force
+        if force is not None and not np.array_equal(force, np.nan if self._force is None else self._force, equal_nan=True):
+            self._with_force()
+            self._force, self._sought = np.array(force), None
+        if self._sought is None:
+            self._sought = by_core.sought(self, {} if self._resets is None else self._resets.new_states)
+            self._by_core = self._sought is not None
+        return self._sought
+
+    def _with_force(self) -> None:
+        """Make trials with the force as it is now: the user may have changed it since the last call."""
+        plan = self.plan._replace(force=np.array(self.plan.force))
+        self.members = Members(plan)
+        self.trials = Trials(plan, self.members)
 
     def _start_from(self, g: list[Array]) -> None:
         """Begin a call with these quantities. The search starts anew for members that the user moved since the last call."""
@@ -134,10 +161,8 @@ class Frames(Collected):
 
     def _after_a_step(self, step: int, may: list[Any], g: list[Array], after: list[Array], before: list[Array]) -> list[Array]:
         """Process the events of a step. Returns the quantities at its end."""
-        if self.plan.force is not None:  # the user may have changed the force since the last call
-            force = np.array(self.plan.force)
-            self.members = Members(self.plan._replace(force=force))
-            self.trials = Trials(self.plan._replace(force=force), self.members)
+        if self.plan.force is not None:
+            self._with_force()
         states = *self._flat(before), *self._flat(self._blocks)
         finite = np.logical_and.reduce([np.isfinite(each).all(axis=tuple(range(each.ndim - 1))) for each in states[2:]])
         t, end = (self.plan.t0 + each * self.plan.dt for each in (step, step + 1))
@@ -167,8 +192,7 @@ class Frames(Collected):
         lying = self._resets.holds(self._rests[index], index, ends, lengths, *(each[..., index] for each in states[:2]))
         v, y = (each[..., index].copy() for each in states[:2])  # members at rest stay at rest
         for _, timed in self.timed:
-            comes = timed.after(index, np.full(len(index), self.way * t))[0] <= self.way * end
-            lying &= ~(comes & self._resets.led_back[self._rests[index], index])
+            lying &= timed.after(index, np.full(len(index), self.way * t))[0] > self.way * end
         if not lying.all():
             moves = index[~lying]
             begin = np.full(len(moves), t)

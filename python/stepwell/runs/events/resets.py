@@ -205,6 +205,10 @@ class Resets:
         """Which of these members begin where an event changed their state, or holds them."""
         return ((self.at[:, member] != 0.0) & ~(self.lain[:, member] & ~self.led_back[:, member])).any(axis=0)
 
+    def may_go_on(self, rests: Whole, member: Whole) -> Any:
+        """Which of these are at rest and may go on later: the event lets them go, or another comes at a known time."""
+        return (rests[member] >= 0) & (self.led_back[rests[member], member] | bool(self._run.timed))
+
     def holds(self, rests: Whole, member: Whole, t: Array, h: Array, v: Array, y: Array) -> Any:
         """Which members at rest at these events would be so at these times."""
         holds = rests >= 0
@@ -318,15 +322,15 @@ class Resets:
             return holds & (across > 0.0) & (side * (g_back - g_further) >= 0.5 * across)
 
     def bounces(self, e: int, t: Array, h: Array, state: State, member: Whole, side: Array) -> Any:
-        """Whether an event turns members back that begin at it, at rest, and are pushed across it.
+        """Whether an event turns members back, or holds them, that begin at it, at rest, and are pushed across it.
 
-        A little later its change of the state must lead to their side. A damping, as of v to 0.9 v, does not.
+        A little later its change of the state must not lead to the other side, as a damping does, of v to 0.9 v.
         """
         if not len(member):
             return np.zeros(0, dtype=bool)
         with np.errstate(all="ignore"):
             t, _, back = self._further(e, t, h, state, self._run.trials.rates(member, t, h, *state), member)
-            return side * self._run.slope(e, member, t, h, *back) > 0.0
+            return side * self._run.slope(e, member, t, h, *back) >= 0.0
 
     def _further(self, e: int, t: Array, h: Array, state: State, rates: State, member: Whole) -> tuple[Array, State, State]:
         """A little later: the time, the state there by these rates, and that which an event makes of it."""
@@ -484,8 +488,7 @@ class Resets:
         first, when = np.full(len(returns), np.inf), np.full(len(returns), np.nan)
         for e, _ in self._run.timed:
             occurs, changes = found[e]
-            held = (returns >= 0) & self.led_back[returns, stretch.member]
-            here = np.flatnonzero(held[changes.place])[::-1]  # so that the first of each stays
+            here = np.flatnonzero(returns[changes.place] >= 0)[::-1]  # so that the first of each stays
             here = here[occurs.share[here] <= first[changes.place[here]]]
             first[changes.place[here]], when[changes.place[here]] = occurs.share[here], occurs.t[here]
         wakes = np.flatnonzero(first < np.inf)

@@ -172,7 +172,7 @@ impl Watch<'_> {
     fn wakes_later(&mut self, course: &mut Course, stop: &mut Stop) -> Option<Instant> {
         let Course { memory, end, state, .. } = course;
         let (Resting { event: e, since: begin }, member, h) = (memory.rest?, memory.member, stop.step.h);
-        if !memory.led_back[e] {
+        if !memory.led_back[e] && !self.motion.events.has_times() {
             return None;
         }
         let nexts: Vec<Option<f64>> = (0..self.events()).map(|e| self.motion.events.next(e, member, begin)).collect();

@@ -30,9 +30,9 @@ pub(crate) struct Memory {
     /// The side from which it came to an event at which it is since that changed its state; 0 for others.
     pub(super) at: Numbers,
     /// Whether the event leads it back to where it is.
-    pub(super) led_back: Vec<bool>,
+    pub(super) led_back: Truths,
     /// Whether it has been there for a step or more, with the quantity at zero.
-    pub(super) lain: Vec<bool>,
+    pub(super) lain: Truths,
     /// Each quantity at the state, and one step before; NaN where that is not known.
     pub now: Numbers,
     pub before: Numbers,
@@ -40,7 +40,7 @@ pub(crate) struct Memory {
     pub(super) rest: Option<Resting>,
     /// It does not go on, in this state.
     pub ended: bool,
-    circle: Vec<bool>,
+    circle: Truths,
     pub(super) often_since: f64,
 }
 
@@ -56,13 +56,13 @@ impl Memory {
         Memory {
             member,
             at: smallvec![0.0; events],
-            led_back: vec![false; events],
-            lain: vec![false; events],
+            led_back: smallvec![false; events],
+            lain: smallvec![false; events],
             now: smallvec![f64::NAN; events],
             before: smallvec![f64::NAN; events],
             rest: None,
             ended: false,
-            circle: vec![false; events],
+            circle: smallvec![false; events],
             often_since: f64::NAN,
         }
     }
@@ -93,7 +93,7 @@ impl Memory {
     /// What is said of it if it is at rest.
     pub(crate) fn said(&self) -> Option<(Rest, f64)> {
         let Resting { event, since } = self.rest?;
-        let (led_back, often_since, circle) = (self.led_back[event], self.often_since, self.circle.clone());
+        let (led_back, often_since, circle) = (self.led_back[event], self.often_since, self.circle.to_vec());
         Some((Rest { member: self.member as i64, event: event as i64, led_back, often_since, circle }, since))
     }
 }
@@ -168,7 +168,7 @@ impl Watch<'_> {
         (0..self.events()).any(|e| self.changes_state(e))
     }
 
-    pub(super) fn events(&self) -> usize {
+    pub(crate) fn events(&self) -> usize {
         self.motion.events.events.len()
     }
 
@@ -180,20 +180,51 @@ impl Watch<'_> {
 
     /// Treats a member that begins at an event with a direction as if it had changed its state, unless the run goes on.
     pub(crate) fn begin_member(&mut self, memory: &mut Memory, t: f64, h: f64, state: &[f64], goes_on: bool) {
+        let g = self.all_g(At { member: memory.member, t, state });
+        if goes_on {
+            memory.now = g;
+        } else {
+            self.begin_again(memory, t, h, (state, &g), [true, true]);
+        }
+    }
+
+    /// The same of a member of a world, with its quantities: whether it begins at all, and was moved since the last call.
+    pub(crate) fn begin_again(
+        &mut self,
+        memory: &mut Memory,
+        t: f64,
+        h: f64,
+        (state, g): (&[f64], &[f64]),
+        [begins, moved]: [bool; 2],
+    ) {
         let at = At { member: memory.member, t, state };
-        for e in 0..self.events() {
-            let direction = self.motion.events.events[e].direction;
-            memory.now[e] = self.motion.g(e, at);
-            if goes_on || memory.now[e] != 0.0 || !self.changes_state(e) {
+        for (e, g) in g.iter().copied().enumerate() {
+            let (changed, direction) = (begins || g != memory.now[e], self.motion.events.events[e].direction);
+            memory.now[e] = g;
+            if moved {
+                memory.before[e] = f64::NAN;
+            }
+            if !self.changes_state(e) {
                 continue;
             }
-            let new = self.motion.changed(e, at);
-            let mut side = 0.0 - direction;
-            if direction == 0.0 {
-                side = 0.0 - sign(self.motion.slope(e, At { state: &new, ..at }, h));
+            if changed {
+                memory.at[e] = if g == 0.0 { 0.0 - direction } else { 0.0 };
             }
-            memory.led_back[e] = self.leads_back((e, side), h, At { state: &new, ..at }, state);
-            memory.at[e] = if memory.led_back[e] || direction != 0.0 { side } else { 0.0 };
+            if (begins || moved) && (memory.at[e] != 0.0 || (changed && g == 0.0)) {
+                let new = self.motion.changed(e, at);
+                let mut side = memory.at[e];
+                if direction == 0.0 && side == 0.0 {
+                    side = 0.0 - sign(self.motion.slope(e, At { state: &new, ..at }, h));
+                }
+                memory.led_back[e] = self.leads_back((e, side), h, At { state: &new, ..at }, state);
+                if memory.led_back[e] {
+                    memory.at[e] = side;
+                }
+            }
+            memory.lain[e] &= !changed;
+        }
+        if moved {
+            (memory.rest, memory.ended) = (None, false);
         }
     }
 
@@ -214,10 +245,10 @@ impl Watch<'_> {
         across > 0.0 && side * (g_back - g_further) >= 0.5 * across
     }
 
-    /// Whether an event turns a member back that begins at it, at rest, and is pushed across it.
+    /// Whether an event turns a member back, or holds it, that begins at it, at rest, and is pushed across it.
     pub(super) fn bounces(&mut self, (e, side): (usize, Side), h: f64, at: At) -> bool {
         let (t, _, back) = self.further(e, h, at);
-        side * self.motion.slope(e, At { t, state: &back, ..at }, h) > 0.0
+        side * self.motion.slope(e, At { t, state: &back, ..at }, h) >= 0.0
     }
 
     /// A little later: the time, the state there by the rates here, and that which an event makes of it.
@@ -421,7 +452,7 @@ impl Watch<'_> {
         returns: Option<usize>,
         found: &mut [(Vec<Located>, Vec<Change>)],
     ) -> Option<f64> {
-        let held = returns.filter(|e| memory.led_back[*e])?;
+        let held = returns?;
         let timed = found.iter().enumerate().filter(|(e, _)| self.is_timed(*e)).filter_map(|(_, (occurs, _))| occurs.first());
         let (first, when) = timed.map(|one| (one.share, one.t)).min_by(|a, b| a.0.total_cmp(&b.0))?;
         memory.at.copy_from_slice(at);
@@ -592,7 +623,7 @@ impl Watch<'_> {
         let Some(rest) = each.memory.rest else { return true };
         let member = each.memory.member;
         let [t, t_end] = [number, number + 1].map(|number| self.time(member, number, h));
-        let comes = each.memory.led_back[rest.event] && self.motion.events.comes(member, t_end - h, t_end);
+        let comes = self.motion.events.comes(member, t, t_end);
         if self.holds(each.memory, rest.event, h, At { member, t: t_end, state: &each.state }) && !comes {
             return false;
         }
@@ -645,7 +676,7 @@ impl Watch<'_> {
             Arrived::Stops(t, state) => (state, Some(t)),
             Arrived::Rests(event, since, state) => {
                 memory.rest = Some(Resting { event, since });
-                memory.ended = !memory.led_back[event];
+                memory.ended = !memory.led_back[event] && !self.motion.events.has_times();
                 (state, None)
             }
         };

@@ -565,6 +565,11 @@ impl Events<'_> {
         self.next(e, member, t).map_or_else(|| may_change(before, g, g_end), |next| next <= self.way * t_end)
     }
 
+    /// Whether the times of an event are known before.
+    pub(crate) fn has_times(&self) -> bool {
+        self.events.iter().any(|event| event.times.is_some())
+    }
+
     /// Whether an event occurs between these times, as is known before.
     pub(crate) fn comes(&self, member: usize, t: f64, t_end: f64) -> bool {
         (0..self.events.len()).any(|e| self.next(e, member, t).is_some_and(|next| next <= self.way * t_end))

@@ -1,6 +1,6 @@
 //! The driver of fixed steps: shares members among threads, saves states, and finds which members diverged.
 
-mod events;
+pub(super) mod events;
 
 use std::{ops::Range, sync::Arc, time::Instant};
 
@@ -513,7 +513,7 @@ impl<T: Real> Job<'_, '_, '_, T> {
                 let (from, count) = (self.from, self.count);
                 let mut on = Stepped {
                     carries: self.carries,
-                    spec: &self.plan.model.spec,
+                    spec: Some(&self.plan.model.spec),
                     first: self.part.first + from,
                     count,
                     h: self.plan.clock.h,

@@ -2,15 +2,25 @@
 
 use std::sync::atomic::Ordering::Relaxed;
 
+pub use super::fixed::events::Between;
 use super::{
     Model,
-    fixed::{Steppable, all_below, huge, kept, save},
+    fixed::{
+        Steppable, all_below,
+        events::{Looking, Looks, Stepped},
+        huge, kept, save,
+    },
     workers::{self, GoOn, Workers},
 };
+
 use crate::{
     error::Error,
+    events::{motion::Events, watch::Watch},
     group::Group,
-    model::{around::force::NAME, spec::Spec},
+    model::{
+        around::force::NAME,
+        spec::{Row, Spec},
+    },
     stage::{Clock, Force, Machine, Stop},
     tape::real::Real,
 };
@@ -437,6 +447,85 @@ impl<T: Steppable> World<T> {
             self.is_written = true;
         }
         true
+    }
+}
+
+impl World<f64> {
+    /// `n` steps with events, in place. `go_on` is asked now and then whether to; returns whether all were made. `between` is what is
+    /// known of the members since the last call.
+    pub fn step_and_look(
+        &mut self,
+        n: i64,
+        [v, y]: [&mut [f64]; 2],
+        events: &Events<'_>,
+        between: &mut Between,
+        go_on: &mut dyn FnMut() -> bool,
+    ) -> bool {
+        let mut watch = Watch::new(events);
+        watch.begin(0, self.members);
+        let mut left = n;
+        while left > 0 {
+            let piece = self.steps_between_checks.unwrap_or(1).min(left);
+            self.look(piece, [v, y], &mut watch, between);
+            left -= piece;
+            if left > 0 && !go_on() {
+                break;
+            }
+        }
+        watch.end();
+        left == 0
+    }
+
+    fn look(&mut self, n: i64, [v, y]: [&mut [f64]; 2], watch: &mut Watch<'_>, between: &mut Between) {
+        let (k, members, carries, h) = (self.step, self.members, self.carries, self.clock.h);
+        let (moved, start) = (!carries || self.is_moved(v, y), [v.to_vec(), y.to_vec()]);
+        let rows = start.each_ref().map(|block| block.chunks_exact(members).map(Row).collect::<Vec<_>>());
+        let state = start.each_ref().map(Vec::as_slice);
+        let groups: Vec<usize> = self.shares.iter().map(|share| share.count).collect();
+        let begins = between.begin(watch, &groups, state);
+        let mut given = Vec::new();
+        for (group, share) in self.shares.iter_mut().enumerate() {
+            if moved {
+                share.load(v, y, members);
+            }
+            if moved && carries {
+                share.group.start(k);
+            }
+            let mut first_bad = vec![-1; share.count];
+            let mut on = Stepped {
+                group: &mut *share.group,
+                carries,
+                spec: None,
+                first: share.first,
+                count: share.count,
+                h,
+                first_bad: &mut first_bad,
+                carried: false,
+                begin: rows.each_ref().map(Vec::as_slice),
+            };
+            let mut looks = Looks::again(watch, between, &mut on, k, (state, begins, group));
+            looks.advance(&mut on, k, n);
+            given.extend(looks.pause(between, &mut on, (k + n, group)));
+            if !carries {
+                share.store(v, y, members);
+            }
+        }
+        if carries {
+            self.publish(k + n, v, y);
+        }
+        let p = self.sizes.0 / members;
+        for (member, state) in given {
+            for (row, number) in state.into_iter().enumerate() {
+                let (array, written, row) =
+                    if row < p { (&mut *v, &mut self.written.0, row) } else { (&mut *y, &mut self.written.1, row - p) };
+                array[row * members + member] = number;
+                if carries {
+                    written[row * members + member] = number;
+                }
+            }
+        }
+        between.end([v, y]);
+        self.step = k + n;
     }
 }
 

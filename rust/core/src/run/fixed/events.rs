@@ -1,6 +1,6 @@
 //! Events of fixed steps: the states after all steps of a group are looked at, some steps at a time.
 
-use std::sync::Arc;
+use std::{ops::Range, sync::Arc};
 
 use crate::{
     events::{
@@ -27,7 +27,7 @@ const NOTICED_OF_GROUP: i64 = 1 << 11;
 const FEWER_AGAIN: usize = 2;
 
 /// The quantities of a group while it is stepped.
-pub(super) struct Looks<'w, 'a> {
+pub(in crate::run) struct Looks<'w, 'a> {
     watch: &'w mut Watch<'a>,
     /// Of each event.
     tiles: Vec<Filled>,
@@ -52,11 +52,82 @@ pub(super) struct Looks<'w, 'a> {
     stops: Vec<Option<Stop>>,
     /// What is known of each member, if events change states.
     memories: Vec<Memory>,
+    /// All lanes are looked at together after each step.
+    in_lanes: bool,
+}
+
+/// What is known of the members of a world between its calls.
+#[derive(Debug, Default)]
+pub struct Between {
+    members: usize,
+    /// v and y at the end of the last call, by rows.
+    left: [Vec<f64>; 2],
+    /// Of each event each member's quantity one step before; NaN where that is not known.
+    before: Vec<Vec<f64>>,
+    /// If events change states: what is known of each member, by groups, and the states of those at rest.
+    memories: Vec<Vec<Memory>>,
+    rest: Vec<Option<Numbers>>,
+}
+
+impl Between {
+    /// Which members of a group the caller moved since the last call, whose states are in these rows.
+    fn moved(&self, state: [&[f64]; 2], members: Range<usize>) -> Vec<bool> {
+        let mut moved = vec![false; members.len()];
+        for (now, left) in state.iter().zip(&self.left) {
+            for (now, left) in now.chunks_exact(self.members).zip(left.chunks_exact(self.members)) {
+                let both = now[members.clone()].iter().zip(&left[members.clone()]);
+                moved.iter_mut().zip(both).for_each(|(moved, (now, left))| *moved |= now != left);
+            }
+        }
+        moved
+    }
+
+    /// Begins a call of a world in such groups, whose state is in these rows. Whether it is the first one.
+    pub(in crate::run) fn begin(&mut self, watch: &Watch, groups: &[usize], state: [&[f64]; 2]) -> bool {
+        let members = groups.iter().sum::<usize>();
+        let (events, begins) = (watch.events(), self.members != members);
+        if begins {
+            let remembered = if watch.changes() { members } else { 0 };
+            *self = Between {
+                members,
+                left: state.map(<[f64]>::to_vec),
+                before: vec![vec![f64::NAN; members]; events],
+                memories: vec![(0..remembered).map(|member| Memory::new(member, events)).collect()],
+                rest: vec![None; remembered],
+            };
+        }
+        if watch.changes() && !self.memories.iter().map(Vec::len).eq(groups.iter().copied()) {
+            let mut all = std::mem::take(&mut self.memories).into_iter().flatten();
+            self.memories = groups.iter().map(|count| all.by_ref().take(*count).collect()).collect();
+        }
+        begins
+    }
+
+    /// Ends a call with this state, into which the states that events gave are written.
+    pub(in crate::run) fn end(&mut self, state: [&[f64]; 2]) {
+        self.left.iter_mut().zip(state).for_each(|(left, now)| {
+            left.clear();
+            left.extend_from_slice(now);
+        });
+    }
 }
 
 impl<'w, 'a> Looks<'w, 'a> {
     /// For so many members from `first` on.
     pub(super) fn new(watch: &'w mut Watch<'a>, notices: bool, lanes: usize, first: usize, count: usize) -> Self {
+        let (events, remembered) = (watch.events(), if watch.changes() { count } else { 0 });
+        let memories = (first..first + remembered).map(|member| Memory::new(member, events)).collect();
+        Looks::with(watch, notices, lanes, (first, count), memories)
+    }
+
+    /// With what is known of them.
+    fn with(
+        watch: &'w mut Watch<'a>,
+        notices: bool,
+        lanes: usize,
+        (first, count): (usize, usize),
+        memories: Vec<Memory>,
+    ) -> Self {
         let mut tiles = watch.motion.in_lanes(lanes);
         for (tile, Event { quantity, .. }) in tiles.iter_mut().zip(&watch.motion.events.events) {
             tile.prepare(&quantity.parameters, first, count);
@@ -64,9 +135,6 @@ impl<'w, 'a> Looks<'w, 'a> {
         let rows = || vec![vec![f64::NAN; lanes]; tiles.len()];
         let (now, before) = (rows(), rows());
         let stops = (0..count).map(|_| None).collect();
-        let events = watch.motion.events.events.len();
-        let remembered = if watch.changes() { count } else { 0 };
-        let memories = (first..first + remembered).map(|member| Memory::new(member, events)).collect();
         Looks {
             watch,
             now,
@@ -76,13 +144,86 @@ impl<'w, 'a> Looks<'w, 'a> {
             carried: Vec::new(),
             slots: Vec::new(),
             values: Vec::new(),
-            given: (0..remembered).map(|_| Vec::new()).collect(),
+            given: memories.iter().map(|_| Vec::new()).collect(),
             begun: false,
             notices,
             together: NOTICED_AT_FIRST,
             stops,
             memories,
+            in_lanes: false,
         }
+    }
+
+    /// For members of a world, whose last call ended at step `k`: searches go on for those that stand where they stood. `state` are
+    /// v and y of all members, by rows; `begins` if there was no call before.
+    pub(in crate::run) fn again(
+        watch: &'w mut Watch<'a>,
+        between: &mut Between,
+        on: &mut Stepped<f64>,
+        k: i64,
+        (state, begins, group): ([&[f64]; 2], bool, usize),
+    ) -> Self {
+        let (lanes, range) = (on.group.lanes(), on.first..on.first + on.count);
+        let memories = between.memories.get_mut(group).map(std::mem::take).unwrap_or_default();
+        let mut looks = Looks::with(watch, false, lanes, (on.first, on.count), memories);
+        looks.in_lanes = true;
+        let moved = between.moved(state, range.clone());
+        for (before, all) in looks.before.iter_mut().zip(&between.before) {
+            let known = all[range.clone()].iter().zip(&moved).map(|(before, moved)| if *moved { f64::NAN } else { *before });
+            before.iter_mut().zip(known).for_each(|(before, known)| *before = known);
+        }
+        if !looks.changes() {
+            return looks;
+        }
+        for row in state.into_iter().flat_map(|block| block.chunks_exact(between.members)) {
+            looks.states.extend_from_slice(&row[range.clone()]);
+            looks.states.resize(looks.states.len() + lanes - on.count, row[range.end - 1]);
+        }
+        looks.find_quantities(on, k, 0);
+        for (lane, moved) in moved.into_iter().enumerate() {
+            let g = looks.values_of(lanes, lane, 0);
+            let (memory, t) = (&mut looks.memories[lane], looks.watch.motion.events.begin.at(on.first + lane) + k as f64 * on.h);
+            if begins || moved || g != memory.now {
+                let state: Numbers = looks.states.iter().skip(lane).step_by(lanes).copied().collect();
+                looks.watch.begin_again(memory, t, on.h, (&state, &g), [begins, moved]);
+            }
+            if !begins && let Some(rest) = between.rest[on.first + lane].take().filter(|_| memory.rests()) {
+                looks.given[lane].push(([k, i64::MAX], rest));
+            }
+        }
+        looks.begun = true;
+        looks
+    }
+
+    /// Ends a call of a world at step `k`: returns the members to which events gave states then, with these.
+    pub(in crate::run) fn pause(
+        mut self,
+        between: &mut Between,
+        on: &mut Stepped<f64>,
+        (k, group): (i64, usize),
+    ) -> Vec<(usize, Numbers)> {
+        for (before, all) in self.before.iter().zip(&mut between.before) {
+            all[on.first..on.first + on.count].copy_from_slice(&before[..on.count]);
+        }
+        let mut states = Vec::new();
+        for (lane, memory) in self.memories.iter().enumerate() {
+            let of_step = self.given[lane].iter().rfind(|([from, until], _)| *from <= k && k < *until);
+            if let Some((_, state)) = of_step {
+                between.rest[on.first + lane] = Some(state.clone()).filter(|_| memory.rests());
+                states.push((lane, state.clone()));
+            }
+        }
+        if on.carries && !states.is_empty() {
+            self.states.clear();
+            self.slots.clear();
+            self.keep_state(on, k);
+            self.begin_anew(on, k, 0, states.clone());
+        }
+        states.iter_mut().for_each(|(lane, _)| *lane += on.first);
+        if let Some(known) = between.memories.get_mut(group) {
+            *known = self.memories;
+        }
+        states
     }
 }
 
@@ -130,19 +271,20 @@ struct Seen {
 
 /// Members that are stepped together, and how.
 pub struct Stepped<'s, T: Real> {
-    pub(super) group: &'s mut dyn Group<T>,
+    pub(in crate::run) group: &'s mut dyn Group<T>,
     /// The v slot holds something else than v between steps.
-    pub(super) carries: bool,
-    pub(super) spec: &'s Spec<'s>,
-    pub(super) first: usize,
-    pub(super) count: usize,
-    pub(super) h: f64,
+    pub(in crate::run) carries: bool,
+    /// None where steps are made one by one.
+    pub(in crate::run) spec: Option<&'s Spec<'s>>,
+    pub(in crate::run) first: usize,
+    pub(in crate::run) count: usize,
+    pub(in crate::run) h: f64,
     /// The first step of each that is not finite, or −1.
-    pub(super) first_bad: &'s mut [i64],
+    pub(in crate::run) first_bad: &'s mut [i64],
     /// The run goes on from an earlier one.
-    pub(super) carried: bool,
+    pub(in crate::run) carried: bool,
     /// The states at the start of the run, by rows.
-    pub(super) begin: [&'s [Row<'s>]; 2],
+    pub(in crate::run) begin: [&'s [Row<'s>]; 2],
 }
 
 impl<T: Real> Stepped<'_, T> {
@@ -168,8 +310,8 @@ impl Looking<f64> for Looks<'_, '_> {
 
     fn advance(&mut self, on: &mut Stepped<f64>, mut k: i64, steps: i64) {
         let until = k + steps;
-        if self.changes() && on.carries {
-            return self.advance_carrying(on, k, until);
+        if self.changes() && (on.carries || self.in_lanes) {
+            return self.advance_together(on, k, until);
         }
         if self.changes() {
             return self.advance_with_changes(on, k, until);
@@ -218,9 +360,9 @@ impl Looks<'_, '_> {
         self.memories.iter().zip(&self.stops).any(|(memory, stop)| !memory.ended && stop.is_none())
     }
 
-    /// Makes steps with events that change states, of a method that carries something else than v: all lanes go on from the end of the
-    /// first step in which one is changed, where what that one carries begins anew.
-    fn advance_carrying(&mut self, on: &mut Stepped<f64>, mut k: i64, until: i64) {
+    /// Makes steps with events that change states, of a world or a method that carries something else than v: all lanes go on from the
+    /// end of the first step in which one is changed, where what that one carries begins anew.
+    fn advance_together(&mut self, on: &mut Stepped<f64>, mut k: i64, until: i64) {
         let (h, (p, _)) = (on.h, on.rows());
         while k < until && self.goes_on() {
             let n = (until - k).min(self.together) as usize;
@@ -241,7 +383,12 @@ impl Looks<'_, '_> {
                     made = row;
                     break;
                 }
+                let (block, numbers) = (self.states.len() / (n + 1), |sum: bool, x: &f64| sum & x.is_finite());
+                let are_finite = self.states[row * block..(row + 2) * block].iter().fold(true, numbers);
                 for lane in 0..on.count {
+                    if are_finite && self.passes(on, k + row as i64, row, lane) {
+                        continue;
+                    }
                     self.look_at(on, [k, row as i64, until], lane, &mut changed);
                 }
                 if !changed.is_empty() {
@@ -290,12 +437,32 @@ impl Looks<'_, '_> {
         }
     }
 
+    /// Whether no event may occur in a step of a lane, whose numbers are all finite; then its quantities go on.
+    fn passes(&mut self, on: &Stepped<f64>, number: i64, row: usize, lane: usize) -> bool {
+        let (lanes, events) = (on.group.lanes(), self.tiles.len());
+        let (memory, of_run) = (&mut self.memories[lane], self.watch.motion.events);
+        if self.stops[lane].is_some() || memory.is_special() || on.first_bad[lane] >= 0 {
+            return false;
+        }
+        let [t, t_end] = [number, number + 1].map(|number| of_run.begin.at(memory.member) + number as f64 * on.h);
+        let g = |row: usize, e: usize| self.values[(row * events + e) * lanes + lane];
+        if (0..events).any(|e| of_run.may_occur(e, memory.member, [memory.before[e], g(row, e), g(row + 1, e)], [t, t_end])) {
+            return false;
+        }
+        for e in 0..events {
+            memory.now[e] = g(row, e);
+            memory.goes_on(e, g(row + 1, e));
+        }
+        true
+    }
+
     /// Looks for events in a step of a lane, the `row`-th after the `k`-th, and notes the state that they give its member. After `until`
     /// steps it may be saved.
     fn look_at(&mut self, on: &mut Stepped<f64>, [k, row, until]: [i64; 3], lane: usize, changed: &mut Vec<(usize, Numbers)>) {
         let (lanes, number, of_run, row) = (on.group.lanes(), k + row, self.watch.motion.events, row as usize);
         let (g, next) = (self.values_of(lanes, lane, row), self.values_of(lanes, lane, row + 1));
         let memory = &mut self.memories[lane];
+        let [t, t_end] = [number, number + 1].map(|number| of_run.begin.at(memory.member) + number as f64 * on.h);
         if self.stops[lane].is_some() || memory.rests() || on.first_bad[lane] >= 0 {
             return;
         }
@@ -310,7 +477,6 @@ impl Looks<'_, '_> {
             return;
         }
         memory.now = g;
-        let [t, t_end] = [number, number + 1].map(|number| of_run.begin.at(member) + number as f64 * on.h);
         let may = |e: usize| of_run.may_occur(e, member, [memory.before[e], memory.now[e], next[e]], [t, t_end]);
         if !memory.is_fresh() && !(0..next.len()).any(may) {
             next.iter().enumerate().for_each(|(e, g)| memory.goes_on(e, *g));
@@ -335,15 +501,22 @@ impl Looks<'_, '_> {
             return;
         }
         let (lanes, (p, q)) = (on.group.lanes(), on.rows());
-        let (block, carried) = ((p + q) * lanes, &self.slots[made * p * lanes..(made + 1) * p * lanes]);
+        let (block, carries) = ((p + q) * lanes, on.carries);
+        let (old_v, old_y) = self.states[made * block..(made + 1) * block].split_at(p * lanes);
         let (v, y) = on.group.slots_mut();
-        y.copy_from_slice(&self.states[made * block + p * lanes..(made + 1) * block]);
+        if !carries {
+            v.copy_from_slice(old_v);
+        }
+        y.copy_from_slice(old_y);
         for (lane, state) in &changed {
             let slots = v.iter_mut().skip(*lane).step_by(lanes).chain(y.iter_mut().skip(*lane).step_by(lanes));
             slots.zip(state).for_each(|(to, x)| *to = *x);
         }
+        if !carries {
+            return;
+        }
         on.group.start(k);
-        let v = on.group.slots_mut().0;
+        let (v, carried) = (on.group.slots_mut().0, &self.slots[made * p * lanes..(made + 1) * p * lanes]);
         for lane in (0..lanes).filter(|lane| !changed.iter().any(|(other, _)| other == lane)) {
             v.iter_mut().skip(lane).step_by(lanes).zip(carried.iter().skip(lane).step_by(lanes)).for_each(|(to, x)| *to = *x);
         }
@@ -489,7 +662,8 @@ impl Looks<'_, '_> {
     fn make_steps(&mut self, on: &mut Stepped<f64>, k: i64, n: i64) {
         self.states.clear();
         self.slots.clear();
-        let unrolled = if self.changes() { 0 } else { on.group.unrolled(on.spec, on.first, on.count) };
+        let spec = on.spec.filter(|_| !self.changes());
+        let unrolled = spec.map_or(0, |spec| on.group.unrolled(spec, on.first, on.count));
         let (mut at, lanes) = (k, on.group.lanes());
         let (p, q) = on.rows();
         while at < k + n {
