@@ -53,6 +53,7 @@ CHATTERING = (38,)
 NONE = np.zeros((2, 2))
 ADAPTIVE = ("dop853", "merson", "tsit5", "rodas5p", "taylor")
 CARRYING = ("verlet", "leapfrog")
+U = 2.0**-53
 METHODS = ("rk4", "standard_heun", "false_euler", "standard_euler", "dop853", "rosenbrock23", "merson")
 
 
@@ -286,6 +287,25 @@ def test_no_member_waits_for_others(monkeypatch: pytest.MonkeyPatch) -> None:
     half = sw.integrate(driven(f=0.0), "merson", **options | {"at": [0.1]})
     assert sw.integrate(half.system, "merson", resume=half, at=[2.0], events=bounce).events["bounce"].count.sum() >= 5
     assert looked
+
+
+@pytest.mark.parametrize("backend", ["rust", "numpy"])
+def test_known_times_within_a_rounding_of_the_ends_of_steps(backend: Any) -> None:
+    """9 · 0.3 is below 2.7 and 3 · 0.1 above 0.3. Verlet's v is a difference divided by a length: not one of 4e-16.
+
+    Bound: some 12 steps, whose roundings of y are divided by their length.
+    """
+    falls = sw.system(order=2)(lambda t, v, y: 0.0 * y - 0.3)()
+    for method, (dt, time) in itertools.product(("verlet", "leapfrog", "rk4"), ((0.3, 2.7), (0.1, 0.3), (0.1, 0.6), (0.1, 0.7))):
+        kick = sw.Event(times=time, then=lambda t, v, y: (v + 1.0, y), name="kick")
+        look = sw.Event(times=time, name="look")
+        turn = sw.Event(lambda t, v, y: v + 9.0, then=lambda t, v, y: (v + 0.2, y), name="turn")
+        run = sw.integrate(falls, method, v=1.3, y=0.7, dt=dt, steps=12, events=[look, kick, turn], backend=backend)
+        end = 12 * dt
+        assert [run.events[name].count for name in ("look", "kick", "turn")] == [1, 1, 0]
+        assert run.events["look"].v[0] == pytest.approx(1.3 - 0.3 * time, abs=12 * 8 * U / dt)
+        assert run.v[-1] == pytest.approx(2.3 - 0.3 * end, abs=12 * 8 * U / dt)
+        assert run.y[-1] == pytest.approx(0.7 + 1.3 * end - 0.15 * end**2 + end - time, abs=12 * 8 * U / dt)
 
 
 def test_a_quantity_that_stays_at_zero_is_not_divided_for_ever() -> None:

@@ -13,7 +13,7 @@ from .. import engine
 from ..occurrences import Occurrences
 from .event import Event
 from .members import Members
-from .parts import Changes, Located, nothing, ordinals
+from .parts import Changes, Located, is_no_time, nothing, ordinals
 from .timed import Timed, Zeros
 from .traced import Quantity
 from .trials import Trials
@@ -155,6 +155,7 @@ class Collected:
             return some
         v, y = self.trials.step(some.member, some.t, t - some.t, some.v, some.y)
         at_end = t == some.t_end
+        v, y = (np.where(is_no_time(some.t, t), *each) for each in zip((some.v, some.y), (v, y), strict=True))
         v, y = (np.where(at_end, *each) for each in zip((some.v_end, some.y_end), (v, y), strict=True))
         share = np.where(at_end, 1.0, (t - some.t) / some.h)
         return some._replace(low=share, high=share, g=sign, g_end=-sign, v_end=v, y_end=y)

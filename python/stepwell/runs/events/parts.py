@@ -8,6 +8,15 @@ import numpy as np
 
 from ...base.arrays import Array, Whole
 
+#: So many units in the last place of a time are none. Verlet divides by the length of a step, so after one of 4e-16 its velocity
+#: would be nothing but roundings.
+ROUNDINGS = 2.0
+
+
+def is_no_time(t: Array, other: Array) -> Any:
+    """Whether there are only roundings of times between these."""
+    return np.abs(other - t) <= ROUNDINGS * np.spacing(np.maximum(np.abs(t), np.abs(other)))
+
 
 class At(NamedTuple):
     """Where members are: the v slot, y, first bad steps, and whether the slot contains what the method carries."""

@@ -12,7 +12,7 @@ from ...errors import EventWarning
 from ...reference.events import located
 from ..findings import Finding
 from .collected import AT_START, Collected
-from .parts import Changes, Located
+from .parts import Changes, Located, is_no_time
 from .traced import NewState
 
 #: A member whose state was changed more often than this within one step is at rest.
@@ -420,7 +420,7 @@ class Resets:
     def _anew(self, member: Whole, step: Whole, end: Array, ahead: Ahead, which: Any) -> Stretch:
         """The rest of the steps, from the new states on."""
         t, v, y = ahead.t[which], ahead.after.v[..., which], ahead.after.y[..., which]
-        h = self._way * np.maximum(self._way * (end - t), 0.0)
+        h = np.where(is_no_time(t, end), 0.0, self._way * np.maximum(self._way * (end - t), 0.0))
         # Where nothing is left of a step, Verlet would divide by its length.
         v_end, y_end = (np.where(h == 0.0, *each) for each in zip((v, y), self._run.trials.step(member, t, h, v, y), strict=True))
         return Stretch(member, step, t, h, v, y, v_end, y_end, ahead.after.at[:, which])

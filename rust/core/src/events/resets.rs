@@ -8,7 +8,7 @@ use super::{
     evaluation::FEW,
     found::Rest,
     motion::{At, Events, Numbers, States, Truths},
-    search::{LEAST_SHARE, Part, located_alone, sign},
+    search::{LEAST_SHARE, Part, is_no_time, located_alone, sign},
     watch::{Candidate, Change, Located, Side, Step, Stop, Watch},
 };
 
@@ -514,7 +514,7 @@ impl Watch<'_> {
                 }
                 return Arrived::AtEnd(stretch.end.clone());
             }
-            let h = way * larger(way * (end - ahead.t), 0.0);
+            let h = if is_no_time(ahead.t, end) { 0.0 } else { way * larger(way * (end - ahead.t), 0.0) };
             let start = ahead.after.state;
             // Where nothing is left of a step, a method may divide by its length.
             let stretch_end = if h == 0.0 {

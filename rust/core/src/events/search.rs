@@ -39,6 +39,15 @@ pub(super) struct Looks {
     pub states: Vec<f64>,
 }
 
+/// So many units in the last place of a time are none.
+const ROUNDINGS: f64 = 2.0;
+
+/// Whether there are only roundings of times between these: `is_no_time` of `runs/events/parts.py`.
+pub(super) fn is_no_time(t: f64, other: f64) -> bool {
+    let size = t.abs().max(other.abs());
+    (other - t).abs() <= ROUNDINGS * (size.next_up() - size)
+}
+
 /// The sign of a number as NumPy gives it: zero of zero, NaN of NaN.
 pub(super) fn sign(x: f64) -> f64 {
     if x > 0.0 {

@@ -7,7 +7,7 @@ use smallvec::smallvec;
 use super::{
     found::Found,
     motion::{At, Event, Events, Motion, Numbers, States},
-    search::{LEAST_SHARE, Looks, Part, located, located_alone, parted, sign},
+    search::{LEAST_SHARE, Looks, Part, is_no_time, located, located_alone, parted, sign},
 };
 use crate::step::watch::REACH;
 
@@ -329,7 +329,9 @@ impl<'a> Watch<'a> {
             let (share, state) = if t == step.t_end {
                 (1.0, step.end.clone())
             } else {
-                ((t - step.t) / step.h, self.motion.step(start, t - step.t).into())
+                let is_start = is_no_time(step.t, t);
+                let state = if is_start { step.start.clone() } else { self.motion.step(start, t - step.t).into() };
+                ((t - step.t) / step.h, state)
             };
             let part = Part { of: 0, low: share, high: share, g_low, g_high: -g_low, slope_low: 0.0, slope_high: 0.0, state };
             changes.push(Change { step: Arc::clone(&step), part });
