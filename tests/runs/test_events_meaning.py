@@ -406,6 +406,15 @@ def test_doses_in_worlds_and_in_pieces_are_those_of_a_run() -> None:
         np.testing.assert_array_equal(y, run.y[k + 1])
         times += world.events["rises"].of(0).t.tolist()
     assert times == run.events["rises"].of(0).t.tolist()
+    # Times are known for some thousand steps, and then for the next.
+    run = sw.integrate(DECAY(), "rk4", y=np.zeros(2), dt=0.25, steps=2500, events=[dose, rises])
+    y[...], heard = 0.0, 0
+    world = sw.World(DECAY(), "rk4", v=np.zeros((0, 2)), y=y, dt=0.25, events=[dose, rises])
+    for n in (1000, 100, 1400):
+        world.step(n)
+        heard += world.events["dose"].count
+    np.testing.assert_array_equal(y, run.y[-1])
+    np.testing.assert_array_equal(heard, run.events["dose"].count)
     for method, first, second in (
         ("rk4", {"dt": 0.25, "steps": 6}, {"steps": 14}),
         ("merson", {"tolerance": 1e-6, "at": [1.2]}, {"at": [5.0]}),

@@ -21,6 +21,8 @@ RUNS = {
     "many bodies": "sw.integrate(sw.NBody(np.ones(1500)), 'leapfrog', v=0.0, y=np.random.rand(1500, 2), dt=1e-6, steps=10**6)",
     "a matrix": "sw.integrate(sw.Oscillator(np.ones(10**4)), 'rk4', v=0.0, y=1.0, dt=0.1, steps=10**8, form='matrix')",
     "a world": "sw.World(sw.Oscillator(1.0), 'rk4', v=np.zeros(1), y=np.ones(1), dt=0.1).step(10**11)",
+    "a world with events": "sw.World(sw.Pendulum(np.ones(1000)), 'rk4', v=np.zeros(1000), y=np.ones(1000), dt=0.01, "
+    "events=sw.Event(lambda t, v, y: y, most=9)).step(10**9)",
     "with a bar": "sw.integrate(sw.Oscillator(1.0), 'rk4', v=0.0, y=1.0, dt=0.1, steps=10**11, progress=True)",
     "a limit of many states": "sw.stability_limit(sw.LinearSystem(np.random.rand(90, 90) - 60 * np.eye(90)), 'false_euler')",
     "limits of many members": "sw.stability_limit(sw.Oscillator(np.ones(10**6), 0.1), 'rk4')",

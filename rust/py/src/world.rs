@@ -12,6 +12,7 @@ use pyo3::{
     types::PyInt,
 };
 use stepwell_core::{
+    error::Error,
     isa::Level,
     model::spec::{Row, Signature, Spec, Table},
     run::{fixed::Steppable, world},
@@ -311,16 +312,20 @@ impl Loop<f64> {
         if let Some(force) = force {
             force.read(py, world)?;
         }
-        let (events, mut heard) = (events.of_core(world.members())?, Ok(()));
+        let events = events.of_core(world.members())?;
+        let is_long = n > world.steps_between_checks().unwrap_or(0) / CALL_IS_SHORT;
         let bad = arrays.with(py, |v, y| {
-            world.step_and_look(n, [&mut *v, &mut *y], &events, between, &mut || {
-                heard = listen(py);
-                heard.is_ok()
-            });
+            if is_long {
+                interruptible(py, None, |monitor| {
+                    let is_made = world.step_and_look(n, [&mut *v, &mut *y], &events, between, &mut || monitor(0.0));
+                    if is_made { Ok(()) } else { Err(Error::Interrupted) }
+                })?;
+            } else {
+                world.step_and_look(n, [&mut *v, &mut *y], &events, between, &mut || true);
+            }
             Ok(!world::are_finite(v, y))
         });
         at.store(world.step_number(), Relaxed);
-        heard?;
         Ok((bad?, found(py, &events)))
     }
 }
