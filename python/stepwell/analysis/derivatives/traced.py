@@ -89,7 +89,7 @@ class Traced:
             known = self.evaluation([each for row in rows for each in row] + self.roots)
             if len(_jacobians) >= MAX_CACHED:
                 _jacobians.clear()
-            _jacobians[key] = known
+            _jacobians[key] = known.of({}, ())  # not a batch's numbers
         return known.of(self.numbers, self.tables)
 
     def tangent(self) -> Evaluation:

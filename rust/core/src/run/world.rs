@@ -17,10 +17,7 @@ use crate::{
     error::Error,
     events::{motion::Events, watch::Watch},
     group::Group,
-    model::{
-        around::force::NAME,
-        spec::{Row, Spec},
-    },
+    model::{around::force::NAME, spec::Spec},
     stage::{Clock, Force, Machine, Stop},
     tape::real::Real,
 };
@@ -479,7 +476,6 @@ impl World<f64> {
     fn look(&mut self, n: i64, [v, y]: [&mut [f64]; 2], watch: &mut Watch<'_>, between: &mut Between) {
         let (k, members, carries, h) = (self.step, self.members, self.carries, self.clock.h);
         let (moved, start) = (!carries || self.is_moved(v, y), [v.to_vec(), y.to_vec()]);
-        let rows = start.each_ref().map(|block| block.chunks_exact(members).map(Row).collect::<Vec<_>>());
         let state = start.each_ref().map(Vec::as_slice);
         let groups: Vec<usize> = self.shares.iter().map(|share| share.count).collect();
         let begins = between.begin(watch, &groups, state);
@@ -501,7 +497,7 @@ impl World<f64> {
                 h,
                 first_bad: &mut first_bad,
                 carried: false,
-                begin: rows.each_ref().map(Vec::as_slice),
+                begin: [&[], &[]],
             };
             let mut looks = Looks::again(watch, between, &mut on, k, (state, begins, group));
             looks.advance(&mut on, k, n);

@@ -283,7 +283,7 @@ pub struct Stepped<'s, T: Real> {
     pub(in crate::run) first_bad: &'s mut [i64],
     /// The run goes on from an earlier one.
     pub(in crate::run) carried: bool,
-    /// The states at the start of the run, by rows.
+    /// The states at the start of the run, by rows; of a world, which begins by itself, none.
     pub(in crate::run) begin: [&'s [Row<'s>]; 2],
 }
 
@@ -441,7 +441,7 @@ impl Looks<'_, '_> {
     fn passes(&mut self, on: &Stepped<f64>, number: i64, row: usize, lane: usize) -> bool {
         let (lanes, events) = (on.group.lanes(), self.tiles.len());
         let (memory, of_run) = (&mut self.memories[lane], self.watch.motion.events);
-        if self.stops[lane].is_some() || memory.is_special() || on.first_bad[lane] >= 0 {
+        if self.stops[lane].is_some() || memory.rests() || memory.is_fresh() || on.first_bad[lane] >= 0 {
             return false;
         }
         let [t, t_end] = [number, number + 1].map(|number| of_run.begin.at(memory.member) + number as f64 * on.h);
@@ -462,7 +462,6 @@ impl Looks<'_, '_> {
         let (lanes, number, of_run, row) = (on.group.lanes(), k + row, self.watch.motion.events, row as usize);
         let (g, next) = (self.values_of(lanes, lane, row), self.values_of(lanes, lane, row + 1));
         let memory = &mut self.memories[lane];
-        let [t, t_end] = [number, number + 1].map(|number| of_run.begin.at(memory.member) + number as f64 * on.h);
         if self.stops[lane].is_some() || memory.rests() || on.first_bad[lane] >= 0 {
             return;
         }
@@ -476,12 +475,12 @@ impl Looks<'_, '_> {
             on.first_bad[lane] = number + 1;
             return;
         }
-        memory.now = g;
-        let may = |e: usize| of_run.may_occur(e, member, [memory.before[e], memory.now[e], next[e]], [t, t_end]);
-        if !memory.is_fresh() && !(0..next.len()).any(may) {
-            next.iter().enumerate().for_each(|(e, g)| memory.goes_on(e, *g));
+        if self.passes(on, number, row, lane) {
             return;
         }
+        let memory = &mut self.memories[lane];
+        memory.now = g;
+        let [t, t_end] = [number, number + 1].map(|number| of_run.begin.at(member) + number as f64 * on.h);
         let whole = Step { member, number, t, h: on.h, t_end, start, end: end.clone(), window: None };
         let mut each = Followed { memory, state: end, first_bad: None, stop: None };
         if self.watch.look(&mut each, whole, &next) {
