@@ -447,12 +447,13 @@ def in_parts(model: ModelSpec, members: int, *, choice: int = 0, attempts: bool 
     "rates" is by tapes of the rates, "hand" by a kernel for one member, "matrix" by products of matrices. None if it is one tape.
     """
 
-def stages(model: ModelSpec, *, choice: int = 0, attempts: bool = False) -> dict[str, Any]:
+def stages(model: ModelSpec, *, choice: int = 0, attempts: bool = False, extends: bool = False) -> dict[str, Any]:
     """The cut tapes of a run, each stage as one tape, for a machine that the core does not write code for.
 
     ``v``, ``y``, ``kept``, ``memory``, ``tally`` and ``recorded`` are how many numbers of a member there are; ``carries`` is
-    whether the method has a carry. ``splits`` has by name, "step" and "start", "finish", "record", "begin",
-    "judged", "by terms" where they are, what ``compiled`` has as ``split``. ``tried`` is None but for attempts of float32.
+    whether the method has a carry. ``splits`` has by name, "step" and "start", "finish", "record", "begin", "judged", "by terms"
+    where they are, and "extension" where it ``extends``, what ``compiled`` has as ``split``. ``tried`` is None but for attempts
+    of float32.
     """
 
 def tape_number(model: ModelSpec, *, choice: int = 0, attempts: bool = False) -> int:

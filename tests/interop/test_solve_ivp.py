@@ -328,7 +328,8 @@ def test_times_end_with_an_event() -> None:
     result = sw.solve_ivp(cannon, (0, 100), [0.0, 10.0], t_eval=np.arange(0.0, 100.0, 15.0), events=ground)
     assert result.t.tolist() == [0.0, 15.0, 30.0]
     # y = 10·t − t²/4 is exact but for rounding: it errs by some roundings of 100 near the ground, where its slope is −10.
-    assert result.y[0] == pytest.approx([0.0, 93.75, 75.0], abs=100 * 30 * EPS)
+    # The weights of one power in the continuous extension, which has the states within the step, are together 3473 at most.
+    assert result.y[0] == pytest.approx([0.0, 93.75, 75.0], abs=100 * 3473 * EPS)
     assert result.t_events[0] == pytest.approx([40.0], abs=100 * 30 * EPS / 10 + ROOT_TOLERANCE * 41)
 
 

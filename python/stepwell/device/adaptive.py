@@ -72,7 +72,7 @@ def adapt(machine: Machine, model: Any, plan: Any, pacing: Any, arrays: Any) -> 
     """Make the run: as ``_core.adapt``. False if nothing was done, since the start is to be found by others."""
     promise.check(machine, single=plan.single)
     members = arrays.status.size
-    stages, text = text_of(model, plan, len(arrays.paces))
+    stages, text = text_of(model, plan, len(arrays.paces), pacing.extends + (pacing.extends and pacing.is_part))
     if pacing.begins and "begin" not in stages.texts:
         return False
     if members == 0:
@@ -83,13 +83,17 @@ def adapt(machine: Machine, model: Any, plan: Any, pacing: Any, arrays: Any) -> 
     return True
 
 
-def text_of(model: Any, plan: Any, numbers: int) -> tuple[Stages, str]:
-    """The stages of a model, and the kernels of a run of adaptive steps; a pace has so many numbers, with those of groups."""
+def text_of(model: Any, plan: Any, numbers: int, extends: int = 0) -> tuple[Stages, str]:
+    """The stages of a model, and the kernels of a run of adaptive steps; a pace has so many numbers, with those of groups.
+
+    ``extends`` is 1 if states before the last time are those of the continuous extension of the method, 2 if the last is, too.
+    """
     observer = plan.observer
-    key = _core.tape_number(model, attempts=True), plan.single, plan.backward, numbers, None if observer is None else observer.key
+    kind = plan.single, plan.backward, numbers, None if observer is None else observer.key, extends
+    key = _core.tape_number(model, attempts=True), kind
     if key not in _TEXTS:
-        stages = Stages(model, single=plan.single, attempts=True)
-        _TEXTS[key] = stages, _Kernels(stages, numbers, len(model.tables), plan.backward, observer).text()
+        stages = Stages(model, single=plan.single, attempts=True, extends=extends > 0)
+        _TEXTS[key] = stages, _Kernels(stages, numbers, len(model.tables), plan.backward, observer, until_last=extends < 2).text()
         while len(_TEXTS) > MOST_TEXTS:
             _TEXTS.popitem(last=False)
     return _TEXTS[key]
@@ -238,8 +242,10 @@ def rows_of(stages: Stages) -> int:
 class _Kernels:
     """Writes the kernels of a run; a pace has so many numbers, and there are so many sampled inputs."""
 
-    def __init__(self, stages: Stages, numbers: int, tables: int, backward: bool, observer: Observer | None) -> None:
-        self.observer = observer
+    def __init__(
+        self, stages: Stages, numbers: int, tables: int, backward: bool, observer: Observer | None, *, until_last: bool = True
+    ) -> None:
+        self.observer, self.until_last = observer, until_last
         self.stages, self.texts, self.numbers, self.tables = stages, stages.texts, numbers, tables
         self.sign = "-1.0" if backward else "1.0"
         if any(text.entries for text in self.texts.values()):
@@ -404,6 +410,36 @@ class _Kernels:
             "}",
         ]
 
+    def extension(self) -> list[str]:
+        """Statements that save the states at the times within a held step that come before the last one."""
+        of, n, text = self.of, self.state, self.texts["extension"]
+        t, h, wall, target = (of[name] for name in ("t", "h", "wall", "target"))
+        *terms, span, changes = text.results[n + self.numbers :]
+        order = len(terms) // max(n, 1)
+        lines = [
+            f"const double final = {'time_of(at, at_width, times - 1, g)' if self.until_last else 'INFINITY'};",
+            f"if ({self.holds()} && {target} < final) {{",
+            *text.body,
+            *(f"const real power{i} = {term};" for i, term in enumerate(terms)),
+            f"const double reach = {wall} < {t} + {h} ? {wall} : {t} + {h}, per_step = 1.0 / {span};",
+            f"while (!({changes} > 0.0) && {target} < reach && {target} < final) {{",
+            f"const double share = ({target} - {t}) * per_step, square = share * share;",
+        ]
+        for i in range(n):
+            odd, even = (self.horner([f"power{j * n + i}" for j in range(first, order, 2)]) for first in (0, 1))
+            lines.append(f"const real within{i} = s{i} + share * ({odd} + share * ({even}));")
+        saved = ["{", *(f"const real s{i} = within{i};" for i in range(n)), *self.save_next(), "}"]
+        following = ["if (next == times) break;", f"{target} = time_of(at, at_width, next, g);"]
+        return [*lines, *saved, *following, "}", "}"]
+
+    @staticmethod
+    def horner(terms: list[str]) -> str:
+        """The sum of terms times powers of a square, by Horner's rule."""
+        *others, total = terms
+        for term in reversed(others):
+            total = f"({term} + square * {total})"
+        return total
+
     def holds(self) -> str:
         """Whether the next saved time is within the held step."""
         t, h, target, wall, held = (self.of[name] for name in ("t", "h", "target", "wall", "held"))
@@ -475,7 +511,7 @@ class _Kernels:
             "const long g = first_member + c; (void)g;",
             *self.load(),
             *([] if self.observer is None else self.observer.begin("next > 0", last_t)),
-            *(line for name in ("step", "judged", "by terms") if name in texts for line in texts[name].member),
+            *(line for name in ("step", "judged", "by terms", "extension") if name in texts for line in texts[name].member),
             f"for (long i = 0; i < limit && status == {RUNNING}; i++) {{",
             "int is_full = 0, ends = 1;",
             # What the driver of the core does between attempts, in its order.
@@ -504,7 +540,10 @@ class _Kernels:
             "const int goes_on = !is_full && next < times;",
             *terms,
             "if (goes_on) {",
+            *(self.extension() if "extension" in texts else []),
+            "if (next < times) {",
             *goes,
+            "}",
             "}",
             "if (ends) {",
             f"const int is_out = {accepted} + {rejected} >= budget, is_finite = {of['error']} < INFINITY;",

@@ -64,9 +64,9 @@ class Stages:
         texts: by name, "step" and those around it.
     """
 
-    def __init__(self, model: Any, *, single: bool, choice: int = 0, attempts: bool = False) -> None:
+    def __init__(self, model: Any, *, single: bool, choice: int = 0, attempts: bool = False, extends: bool = False) -> None:
         check_length(model)
-        made = _core.stages(model, choice=choice, attempts=attempts)
+        made = _core.stages(model, choice=choice, attempts=attempts, extends=extends)
         self.single, self.tried = single, made["tried"]
         self.sizes = {name: int(made[name]) for name in ("v", "y", "kept", "memory", "tally", "recorded")}
         self.carries = bool(made["carries"])

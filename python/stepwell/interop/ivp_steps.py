@@ -9,12 +9,12 @@ import numpy as np
 
 from ..analysis.stiffness import HELD_DOWN, Course, stiff_members, suspects
 from ..base import checks
-from ..base.arrays import Array
+from ..base.arrays import Array, Whole
 from ..errors import ArgumentError, ShapeError
 from ..reference import adaptive
 from ..runs import engine
-from ..runs.adaptive import paces_of
-from ..runs.between import by_steps
+from ..runs.adaptive import of_extra_steps, paces_of
+from ..runs.between import reach_of, within_steps
 from ..runs.diagnostics import may_be_stiff
 from ..runs.request import Request
 
@@ -50,7 +50,10 @@ class Trajectory:
             at=at, budget=MAX_ATTEMPTS, every=int(keeps), waypoints=not self.method.is_always_stable
         )
         self._attempts, self._each, self._between = attempts, engine.evaluations_of_attempt(plan), 0
+        self._of_extra = of_extra_steps(plan, self._each, dense=len(at) > 1)
         self._waypoints: Array | None = None
+        #: Where the step ends in which an event ended the trajectory.
+        self._end_of_last: float | None = None
         self.end, self.status = float(at[-1]), adaptive.BUDGET
         self.times, self.states, self.saved = np.array([plan.t0]), request.y[np.newaxis], np.empty((0, len(request.y)))
 
@@ -67,7 +70,8 @@ class Trajectory:
     @property
     def evaluations(self) -> int:
         """Function evaluations so far."""
-        return int(paces_of(self._plan, self._paces, self._each).evaluations) + self._each * self._between
+        made = paces_of(self._plan, self._paces, self._each, self._of_extra)
+        return int(made.evaluations) + self._of_extra * self._between
 
     def advance(self) -> bool:
         """Make the steps of the next piece. Return whether there was one."""
@@ -91,23 +95,47 @@ class Trajectory:
         return True
 
     def end_at(self, time: float) -> None:
-        """Take back what is after this time."""
+        """Take back what is after this time; the state there is made by a step of the method."""
         kept = self.times < time
-        last = self.at(np.array([time])).T
+        last = self.stepped(time)[np.newaxis]
+        self._end_of_last = self._ends()[kept.sum() - 1]
         self.times, self.states = np.append(self.times[kept], time), np.concatenate([self.states[kept], last])
 
     def at(self, times: Array) -> Array:
         """The states at times from the start to the end of the steps so far, shape (n, times), by one call of the core.
 
-        Each is computed by a step of the method from the end of the step before it, so its error is that of a shorter step.
+        They are those of the continuous extension of the method; without one each is computed by a step of it.
         """
         if not len(times):
             return np.empty((len(self._last), 0))
+        return self._within(times, self._ends()[np.searchsorted(self.times, times, side="right") - 1])
+
+    def stepped(self, time: float) -> Array:
+        """The state at a time by a step of the method from the end of the step before it, shape (n,)."""
+        return self._within(np.array([time]), np.array([np.nan]))[:, 0]
+
+    def _ends(self) -> Array:
+        """Where the steps end that begin at the times that are kept."""
+        last = reach_of(self._paces, self.times[-1]) if self._end_of_last is None else self._end_of_last
+        ends = np.append(self.times[1:], np.nan)
+        if len(ends) > 1 and self.times[-1] == self.end:
+            ends[-2] = last
+        return ends
+
+    def _within(self, times: Array, ends: Array) -> Array:
+        """The states at times in steps that end there, NaN where that is not known, shape (n, times)."""
         steps = np.searchsorted(self.times, times, side="right") - 1
-        since, start = self.times[steps], (np.empty((0, len(times))), self.states[steps].T)
+        since, member = self.times[steps], np.zeros(len(times), np.int64)
         self._between += int((since < times).sum())
-        paces = np.repeat(self._paces[:, np.newaxis], len(times), axis=1)
-        return by_steps(self._plan._replace(batch=times.shape), self._pacing, paces, since, times, *start)[1]
+
+        def start(some: Whole) -> tuple[Array, Array]:
+            return np.empty((0, len(some))), self.states[steps[some]].T
+
+        def plan_of(member: Whole) -> engine.Plan:
+            return self._plan._replace(batch=member.shape)
+
+        paces = self._paces[:, np.newaxis]
+        return within_steps(plan_of, lambda _: self._pacing, paces, (member, since, ends), times, start)[1]
 
     def loses_to(self, requested: Callable[[], Request]) -> bool:
         """Whether another method would have come as far with a part of the attempts: see ``PART``."""
@@ -133,8 +161,8 @@ class Solution:
     """The states of a trajectory at any time between its ends: ``sol`` of ``solve_ivp``.
 
     Called with a time it returns the state, shape (n,); with times along one axis, their states, shape (n, times). Each is
-    computed by a step of the method from the end of the step before it. That takes the function evaluations of a step and has the
-    error of a shorter one.
+    that of the continuous extension of the method, as at ``t_eval``; without one it takes a step of the method from the end of
+    the step before it.
 
     Attributes:
         ts: the start and the ends of the steps, in the direction of the run.

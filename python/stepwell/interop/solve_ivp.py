@@ -240,7 +240,7 @@ def _ended(trajectory: Trajectory, events: list[Event], values: list[list[float]
     for k in range(len(values) - 1, len(trajectory.times)):
         span = sign * trajectory.times[k - 1], sign * trajectory.times[k]
         values.append([event.value(span[1], trajectory.states[k]) for event in events])
-        ended = note_zeros(events, values[-3:], lambda t: trajectory.at(np.array([sign * t]))[:, 0], span)
+        ended = note_zeros(events, values[-3:], lambda t: trajectory.stepped(sign * t), span)
         if ended is not None:
             return ended
     return None

@@ -63,6 +63,8 @@ class Method(Immutable):
     evaluations: int
     #: Function evaluations of an attempt at an adaptive step; 0 if it does not estimate its error.
     attempt_evaluations: int
+    #: Those of its continuous extension, by which states within a step of a run with a tolerance are found; 0 without one.
+    extension_evaluations: int
     #: The family of methods to which it belongs.
     family: str
     #: Whether its steps sum the Taylor series of the solution. With a tolerance it then chooses the order that costs least.
@@ -233,6 +235,7 @@ EXACT = Method(
         "order": math.inf,
         "evaluations": 0,
         "attempt_evaluations": 0,
+        "extension_evaluations": 0,
         "family": "exact",
         "is_implicit": False,
         "limit": math.inf,

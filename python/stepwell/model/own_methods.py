@@ -45,6 +45,7 @@ class OwnMethod(Method):
                 "order": order,
                 "evaluations": evaluations(counted),
                 "attempt_evaluations": evaluations(programs.whole) if programs.estimates else 0,
+                "extension_evaluations": 0,
                 "family": "of your own",
                 "nodes": sorted({share for kind, _, share in counted.operations if kind in rates}),
                 "needs_acceleration": acceleration,

@@ -41,6 +41,7 @@ from .adaptive import (
 from .bits import DOUBLE, add_bits, and_bits, at_most, less, shift_up, where
 from .log import split
 from .series import Branch, expanded
+from .tableau import polynomial
 
 #: The most by which a step may be longer than the one before: where the last terms vanish, nothing else bounds it.
 MAX_GROWTH = 1024.0
@@ -102,10 +103,11 @@ def attempt(
     length = where(outlook.is_extra, pace.extra, step)
     share = length * (1.0 / unit)
     low: tuple[Any, Any] = lows(v, y, pace) if acceptance.compensated else (0.0, 0.0)
-    changes = [value(rest, [term[i] for term in terms], share) for i, rest in enumerate(low)]
+    changes = [polynomial(rest, [term[i] for term in terms], share) for i, rest in enumerate(low)]
     (v1, low_v), (y1, low_y) = compensated(v, changes[0]), compensated(y, changes[1])
     new = sizes(v1, y1, block_axes, groups)
-    slope_v, slope_y = (value(terms[0][i], [(k + 1.0) * term[i] for k, term in enumerate(terms[1:], 1)], share) for i in range(2))
+    slopes = [[(k + 1.0) * term[i] for k, term in enumerate(terms[1:], 1)] for i in range(2)]
+    slope_v, slope_y = (polynomial(first, rest, share) for first, rest in zip(terms[0], slopes, strict=True))
     end = pace.t + length
     rate_v, rate_y = system.unit.dv(end, v1, y1), system.unit.dy(end, v1, y1)
     defect = sizes(slope_v - unit * rate_v, slope_y - unit * rate_y, block_axes, groups)
@@ -134,24 +136,6 @@ def attempt(
 def unit_of(step: Any) -> Any:
     """The unit of time of the coefficients, the power of two at or below a step: they overflow in no unit of the user's."""
     return and_bits(step, EXPONENT)
-
-
-def value(start: Array, terms: Sequence[Array], share: Any) -> Array:
-    """The sum of a series at a distance: odd and even powers apart, by Horner's rule.
-
-    The start comes last, so that it is rounded once.
-    """
-    square = share * share
-
-    def summed(powers: Sequence[Array]) -> Any:
-        total = powers[-1]
-        for term in reversed(powers[:-1]):
-            total = term + square * total
-        return total
-
-    odd, even = summed(terms[::2]), summed(terms[1::2])
-    end: Array = start + share * (odd + share * even)
-    return end
 
 
 def lows(v: Array, y: Array, pace: Pace) -> tuple[Array, Array]:

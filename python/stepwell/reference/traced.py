@@ -15,6 +15,7 @@ import numpy as np
 from . import adaptive, contact, series_pace
 from .acceptance import Acceptance
 from .around import Bound, wrapped
+from .bits import where
 from .run import linear_step
 from .signal import Held, converted, of_slot, over
 
@@ -180,6 +181,15 @@ class Tracer:
             order = method.error_order
             following, v, y = adaptive.attempt(steps, system, order, axes, acceptance, pace, self.tape.budget(), v, y)
         return self.flat(v, y, *following.numbers)
+
+    def extension(self, method: Any, acceptance: Acceptance = Acceptance(), *, backward: bool = False) -> list[Any]:  # noqa: B008
+        """The continuous extension of the next step, behind the state and the pace: see ``adaptive.Extension``."""
+        v, y, more = self.state()
+        pace = self.pace(acceptance, more)
+        axes = len(self.system.v_shape), len(self.system.y_shape)
+        made = adaptive.extension(method.steps, self.attempted(backward=backward), axes, acceptance, pace, v, y)
+        changes = where(made.changes, 1.0, 0.0)
+        return self.flat(v, y, *pace.numbers, *(block for pair in made.terms for block in pair), made.step, changes)
 
     def tried(self, method: Any, *, backward: bool = False) -> list[Any]:
         """The first part of an attempt of float32, before the decision: see ``adaptive.Tried``.

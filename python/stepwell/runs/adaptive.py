@@ -60,11 +60,9 @@ def run_of(request: Request, out: engine.Adapted, t: Array, v: Array, y: Array) 
     """The run of what the engine made, with these states saved at these times."""
     assert request.step_control is not None
     plan, (pacing, _, t0, times, going_on, _, _), method = request.plan, request.step_control, request.plan.method
-    counted, stopped, control = (
-        paces_of(plan, out.paces, out.evaluations),
-        np.count_nonzero(out.status) > 0,
-        request.system.control,
-    )
+    of_extra = of_extra_steps(plan, out.evaluations, dense=len(pacing.at) > 1 or not pacing.begins)
+    counted, stopped = paces_of(plan, out.paces, out.evaluations, of_extra), np.count_nonzero(out.status) > 0
+    control = request.system.control
     run = Run(
         t=t,
         v=v.astype(plan.dtype, copy=False),
@@ -92,13 +90,18 @@ def run_of(request: Request, out: engine.Adapted, t: Array, v: Array, y: Array) 
     return run
 
 
-def paces_of(plan: engine.Plan, numbers: Array, evaluations: int) -> Paces:
-    """What a run tells of the step-size controllers at its end, whose attempts make so many function evaluations."""
+def of_extra_steps(plan: engine.Plan, evaluations: int, *, dense: bool) -> int:
+    """Function evaluations of an extra step: those of an attempt, or of the extension in a run with states within steps."""
+    return max(evaluations, plan.method.extension_evaluations) if dense and engine.extends(plan) else evaluations
+
+
+def paces_of(plan: engine.Plan, numbers: Array, evaluations: int, of_extra: int | None = None) -> Paces:
+    """What a run tells of the step-size controllers; its attempts make so many function evaluations, and its extra steps."""
     accepted, rejected, extra_steps = numbers[engine.COUNTS].astype(np.int64)
     # A series needs no further evaluation for the states within a step, unless operations are fused.
     again = numbers[engine.HELD] > 0.0 if plan.method.has_series and not plan.fused else extra_steps
     sign = -1.0 if plan.backward else 1.0
-    made = evaluations * (accepted + rejected + again)
+    made = evaluations * (accepted + rejected) + (evaluations if of_extra is None else of_extra) * again
     return Paces(sign * numbers[engine.TIME], sign * numbers[engine.STEP], accepted, rejected, made)
 
 

@@ -13,7 +13,7 @@ from ..base.immutable import changed
 from ..model.methods import method
 from ..model.systems import NBody, System
 from . import engine, known_energy
-from .adaptive import paces_of, run_of
+from .adaptive import of_extra_steps, paces_of, run_of
 from .diagnostics import findings_of
 from .findings import is_heard
 from .options import block_like
@@ -35,6 +35,7 @@ class ShortAdaptiveRun:
         self.request, self.core = request, core
         self.shapes = (times, *request.v.shape), (times, *request.y.shape), request.v.shape, request.y.shape, shape_of_paces
         self.evaluations = engine.evaluations_of_attempt(plan)
+        self.of_extra = of_extra_steps(plan, self.evaluations, dense=times > 1 or not control.pacing.begins)
         #: Whether nothing can be found of a run but what the core checks, and of its absolute tolerance.
         self.is_plain = is_plain
         is_absolute = not plan.acceptance.own and bool((control.paces[engine.ABSOLUTE] > engine.LEAST).any())
@@ -66,7 +67,7 @@ class ShortAdaptiveRun:
         if outcome == NOT_MADE:
             return None
         request = self.request
-        paces = paces_of(request.plan, pace, self.evaluations)
+        paces = paces_of(request.plan, pace, self.evaluations, self.of_extra)
         pace[engine.TARGET] = self.end
         run = object.__new__(Run)
         attributes = run.__dict__

@@ -243,9 +243,9 @@ class Run(ValueEquality):
     def __call__(self, t: Any) -> Any:
         """The states at times between the saved ones, of a run with a tolerance and ``every=1``.
 
-        Each is computed by a step of the method from the end of the accepted step before it, as states at the times of ``at=``
-        are, so its error is that of a shorter step. All are made by one call of the core. Where an event stopped a member, its
-        states after that are that of the event; where a member stopped by itself, NaN.
+        They are those at the times of ``at=``, of the continuous extension of the method; where it has none, and in a step in
+        which an event stopped a member, each is computed by a step of the method from the end of the accepted step before it.
+        Where an event stopped a member, its states after that are that of the event; where a member stopped by itself, NaN.
 
         Args:
             t: times within the run, units of time, of any shape; the same for all members.

@@ -354,7 +354,7 @@ fn attempts_of_a_large_member_are_those_of_its_tape() {
                 }
                 seen
             };
-            let of_tape = run(&mut AdaptiveLanes::new(&traced, &spec, level, 1, 30.0).unwrap());
+            let of_tape = run(&mut AdaptiveLanes::new(&traced, &spec, level, 1, 30.0, false).unwrap());
             let clock = Clock { t0: 0.0, h: 1.0 };
             // Tapes of rates are scaled to a step of 1, on which a push depends.
             let mut rates: Vec<Box<dyn Rates>> = Vec::new();
@@ -367,7 +367,7 @@ fn attempts_of_a_large_member_are_those_of_its_tape() {
             for (kind, rates) in rates.into_iter().enumerate() {
                 let rates = with_equations(rates, &key, &spec, shape, level, &clock).unwrap();
                 let schedules = Schedules::of(&key.how, rates.traits(), traced.shape).unwrap();
-                let mut large = LargeAdaptive::new(schedules, rates, &traced, level, 30.0).unwrap();
+                let mut large = LargeAdaptive::new(schedules, rates, &traced, level, 30.0, false).unwrap();
                 assert_eq!(run(&mut large), of_tape, "{} on {signature:?}, rates {kind}", record.name);
             }
         }

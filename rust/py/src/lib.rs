@@ -236,6 +236,8 @@ struct PacingOf<'py> {
     budget: i64,
     begins: bool,
     every: i64,
+    extends: bool,
+    is_part: bool,
 }
 
 /// The steps that are kept: see `KeptSteps` in `runs/engine/adaptive.py`.
@@ -302,6 +304,8 @@ fn adapt_with(
         jumps: by_row(&pacing.jumps)?,
         paces: by_row(&arrays.paces)?,
         begins: pacing.begins,
+        extends: pacing.extends,
+        is_part: pacing.is_part,
         budget: pacing.budget,
         every: pacing.every,
         v: by_row(&v)?,
@@ -514,11 +518,11 @@ fn tape_number(py: Python<'_>, model: &ModelSpec, choice: usize, attempts: bool)
 
 /// The cut tapes of a run: see `_core.pyi`.
 #[pyfunction]
-#[pyo3(signature = (model, *, choice=0, attempts=false))]
-fn stages<'py>(py: Python<'py>, model: &ModelSpec, choice: usize, attempts: bool) -> PyResult<Bound<'py, PyDict>> {
+#[pyo3(signature = (model, *, choice=0, attempts=false, extends=false))]
+fn stages<'py>(py: Python<'py>, model: &ModelSpec, choice: usize, attempts: bool, extends: bool) -> PyResult<Bound<'py, PyDict>> {
     let (rows, tables) = (model.rows(py)?, model.tables(py)?);
     let how = if attempts { model.attempts() } else { model.started(choice) };
-    let stages = model.model(how, &rows, &tables)?.stages().map_err(core_error)?;
+    let stages = model.model(how, &rows, &tables)?.stages(extends).map_err(core_error)?;
     let d = PyDict::new(py);
     for (name, size) in stages.sizes {
         d.set_item(name, size)?;

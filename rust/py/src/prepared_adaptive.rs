@@ -59,6 +59,7 @@ struct Input {
     v: Rows,
     y: Rows,
     begins: bool,
+    extends: bool,
     budget: i64,
     members: usize,
 }
@@ -92,6 +93,8 @@ impl Input {
             jumps: self.jumps.rows(),
             paces: self.paces.rows(),
             begins: self.begins,
+            extends: self.extends,
+            is_part: false,
             budget: self.budget,
             every: 0,
             v: self.v.rows(),
@@ -139,6 +142,7 @@ pub(crate) fn prepared_adaptive(
         v: Rows::zeros(numbers[0], members),
         y: Rows::zeros(numbers[1], members),
         begins: pacing.begins,
+        extends: pacing.extends,
         budget: pacing.budget,
         members,
     };

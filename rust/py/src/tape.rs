@@ -385,11 +385,11 @@ impl Tape {
         Ok(Symbol { tape: Arc::clone(&self.0), id })
     }
 
-    /// Traces what the core makes of a model: the next state of a "step", an "attempt" with its pace, the pace to "begin" with,
+    /// Traces what the core makes of a model: the next state of a "step", an "attempt" with its pace, its "extension", the pace to "begin" with,
     /// or a "record".
     fn trace(&self, model: &ModelSpec, what: &str) -> PyResult<Vec<Symbol>> {
         let before = std::mem::take(&mut *lock(&self.0));
-        let how = if matches!(what, "attempt" | "judged" | "begin") { model.attempts() } else { model.how.clone() };
+        let how = if matches!(what, "attempt" | "judged" | "extension" | "begin") { model.attempts() } else { model.how.clone() };
         let traced = trace::trace(before.clone(), &model.signature, &how, what);
         let (tape, next) = traced.inspect_err(|_| *lock(&self.0) = before).map_err(core_error)?;
         *lock(&self.0) = tape;

@@ -4,7 +4,7 @@ The files are named as the core's in ``step/``: ``sizes`` of components, the ``c
 decides after them. ``runs`` goes from one saved time to the next. What is tolerated is in ``reference/acceptance.py``.
 """
 
-from .attempts import Attempted, Backward, Pair, Stretched, Tried, tried
+from .attempts import Attempted, Backward, Pair, Stretched, Tried, tried, within
 from .controller import MAX_FACTOR, MIN_FACTOR, MOVES, SINGLE_MOVES, Outlook, Pace
 from .pace import (
     LEAST_PART,
@@ -13,9 +13,11 @@ from .pace import (
     PUSHED,
     ROUNDING,
     SINGLE_ROUNDING,
+    Extension,
     attempt,
     begin,
     decided,
+    extension,
     judged,
     over,
     rounded,
@@ -42,6 +44,7 @@ __all__ = [
     "UNDERFLOW",
     "Attempted",
     "Backward",
+    "Extension",
     "Jumps",
     "Outcome",
     "Outlook",
@@ -52,6 +55,7 @@ __all__ = [
     "attempt",
     "begin",
     "decided",
+    "extension",
     "judged",
     "largest",
     "longer",
@@ -66,4 +70,5 @@ __all__ = [
     "total",
     "tried",
     "waiting",
+    "within",
 ]

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple, Protocol
 from ...base.arrays import Array, Scaled
 from .. import tableau
 from ..around import Bound, wrapped
-from ..tableau import Increments, Weights
+from ..tableau import Increments, Weights, polynomial
 
 
 class Pair(Protocol):
@@ -17,6 +17,9 @@ class Pair(Protocol):
 
     def stages(self, s: Any, t: Any, h: Any, v: Array, y: Array, /) -> Increments:
         """The increments of all stages; time and step are each member's own."""
+
+    def extension(self, s: Any, t: Any, h: Any, v: Array, y: Array, /) -> Increments:
+        """The coefficients of the powers of θ in the state at the share θ of the step, of those methods that have one."""
 
 
 class Stretched:
@@ -140,3 +143,9 @@ def tried(pair: Pair, system: Attempted, t: Any, step: Any, v: Array, y: Array, 
         errors = [tableau.combined(each, increments) for each in weights]
     v2, y2, work = system.project(v1, y1)
     return Tried(v1, y1, errors, (v2, y2), s.work / step if hasattr(s, "work") else work)
+
+
+def within(terms: Increments, v: Array, y: Array, share: Any) -> tuple[Array, Array]:
+    """The state at that share of a step from v and y, by the coefficients of its powers."""
+    of_v, of_y = ([term[i] for term in terms] for i in range(2))
+    return v + polynomial(0.0, of_v, share), y + polynomial(0.0, of_y, share)

@@ -28,8 +28,9 @@ class Pace(NamedTuple):
     """The time of each member and the state of its step-size controller. All are floats, even the counts.
 
     Steps do not depend on the saved times: a step that passes the next of them is held, not taken, until the states within it are
-    saved. Each is computed by an extra step, from the start of the held one. An extra step whose error is not tolerated shows
-    that the held one missed something: that one is then rejected.
+    saved, by the continuous extension of the method. The last of them, and all where there is no extension, are made by extra
+    steps from the start of the held one. An extra step whose error is not tolerated shows that the held one missed something:
+    that one is then rejected.
 
     Attributes:
         t: its time.
@@ -49,7 +50,7 @@ class Pace(NamedTuple):
         most: how much the next step may grow.
         accepted: accepted attempts.
         rejected: rejected attempts.
-        extra_steps: steps for saved states: the extra ones, and those that were held and are made once more.
+        extra_steps: steps for saved states: the extra ones, and those that were held and are made once more or extended.
         error: the last error over the tolerance.
         work: the energy that a control or projection added in accepted steps; for a control the sum over their evaluations.
         longest: the largest size so far of each group, along the first axis.

@@ -3,7 +3,7 @@
 The increments of a step h are h times those of a step of 1, so a system is scaled once and stretched to every step.
 """
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -11,7 +11,8 @@ from ...base.arrays import Array
 from .. import mass
 from ..acceptance import Acceptance
 from ..bits import at_most, less, where
-from .attempts import Attempted, Pair, Tried, tried
+from ..tableau import Increments
+from .attempts import Attempted, Pair, Tried, tried, within
 from .controller import MAX_FACTOR, MIN_FACTOR, MOVES, Outlook, Pace
 from .sizes import component, largest, longer, numbers_in, sizes, stacked, total
 
@@ -65,6 +66,9 @@ SMOOTH = 32.0
 #: times less: a pole within the step, of which the method happens to be exact. By Fehlberg's it is 0.96 and 10¹¹ at least; of
 #: 55 000 steps of tame and of stiff motions none had more than 330 times where rates differed by a tenth.
 WILD, CHANCE = 0.5, 1024.0
+#: States within a step take steps of their own where so many times what is tolerated of a group at one end is more than the group
+#: is at the other.
+CHANGES = 32.0
 #: The error over the tolerance that a step counts as which makes a component negative that has to stay positive.
 OUTSIDE = 16.0
 #: The first step is the fraction FIRST of the time in which the state changes, at the start and at two times ahead: rather too
@@ -215,6 +219,37 @@ def judged(
     if trial.work is not None:
         following = following._replace(work=where(goes_on & ~outlook.is_extra, pace.work + trial.work, pace.work))
     return following, *(where(goes_on, new, now) for new, now in zip(trial.projected, (v, y), strict=True))
+
+
+class Extension(NamedTuple):
+    """The continuous extension of a step.
+
+    Attributes:
+        terms: the coefficients of the powers of θ in the state at the share θ of the step, of v and y.
+        step: how long the step is, the difference of its ends.
+        changes: whether a group changes so much in the step that states within it are better made by steps.
+    """
+
+    terms: Increments
+    step: Any
+    changes: Any
+
+
+def extension(
+    pair: Pair, system: Attempted, block_axes: tuple[int, int], acceptance: Acceptance, pace: Pace, v: Array, y: Array
+) -> Extension:
+    """The continuous extension of the step that comes next.
+
+    What is tolerated of a group is relative to its larger size at the ends of the step, and a polynomial through both errs by as
+    much everywhere between. Where that is not small beside the smaller size, and the tolerance is relative to the present one, it
+    would be too much.
+    """
+    step = pace.reach()[0] - pace.t
+    terms = pair.extension(system.rates(step), pace.t, step, v, y)
+    old, new = (sizes(*blocks, block_axes, acceptance.groups) for blocks in ((v, y), within(terms, v, y, 1.0)))
+    larger, smaller = longer(old, new), where(less(new, old), new, old)
+    share = where(at_most(larger, 0.0), 0.0, (CHANGES * pace.tolerances()[0]) * larger / smaller)
+    return Extension(terms, step, less(0.0, pace.lasts) & ~at_most(largest(share), 1.0))
 
 
 def over(error: Any, bound: Any) -> Any:

@@ -126,8 +126,13 @@ def run(
     series: bool = False,
     every: int = 0,
     waypoints: Array | None = None,
+    is_part: bool = False,
+    extension: Callable[[Pace, Array, Array, Any], tuple[Array, Array, Any]] | None = None,
 ) -> Outcome:
     """Continue all members and save their states at the ascending times ``at``. States after a member has stopped are NaN.
+
+    The state at the last time is made by a step of the method to there, unless the run ``is_part`` of another. So are those
+    before without ``extension(pace, v, y, t)``, the state at a time within the held step and whether it is as good as a step's.
 
     ``attempt(pace, budget, v, y)`` is one attempt of all members. Every ``every``-th accepted step is recorded, or none if
     it is 0. ``waypoints`` gets the last waypoints of each member (``waypoints.keep``).
@@ -140,6 +145,7 @@ def run(
         for target in at:
             within = (pace.held > 0.0) & (target < pace.reach()[0])
             pace = pace._replace(target=target * one, held=where(within, 1.0, 0.0))
+            is_last = (target >= at[-1]) & (not is_part)
             there, at_target = np.zeros(pace.t.shape, dtype=bool), (np.full(v.shape, np.nan), np.full(y.shape, np.nan))
             while True:
                 while pace.outlook(budget).runs.any():
@@ -152,6 +158,11 @@ def run(
                     if jumps is not None:
                         pace = jumps.crossed(pace, series=series)
                 waits = (pace.held > 0.0) & ~there
+                if extension is not None and np.any(waits & ~is_last):
+                    *states, holds_good = extension(pace, v, y, target)
+                    within_step = waits & ~is_last & holds_good
+                    at_target = tuple(where(within_step, new, old) for new, old in zip(states, at_target, strict=True))
+                    there, waits = there | within_step, waits & ~within_step
                 extra = pace._replace(extra=where(waits, target - pace.t, 0.0))
                 pace, v1, y1 = attempt(extra, budget, v, y) if waits.any() else (pace, v, y)
                 arrives = ~there & where(waits, pace.held > 0.0, pace.t >= target)

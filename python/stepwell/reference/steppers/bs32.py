@@ -14,6 +14,12 @@ ROWS = (
 WEIGHTS = (2 / 9, 1 / 3, 4 / 9, 0.0)
 #: The third-order result less the second-order one.
 ERROR = (-5 / 72, 1 / 12, 1 / 9, -1 / 8)
+#: The weights of the powers of θ in the state at the share θ of a step: Hermite's cubic, of third order.
+EXTENSION = (
+    (1.0, 0.0, 0.0, 0.0),
+    (-4 / 3, 1.0, 4 / 3, -1.0),
+    (5 / 9, -2 / 3, -8 / 9, 1.0),
+)
 
 
 def stages(s: Scaled, t: float, h: float, v: Array, y: Array) -> Increments:
@@ -24,3 +30,8 @@ def stages(s: Scaled, t: float, h: float, v: Array, y: Array) -> Increments:
 def step(s: Scaled, t: float, h: float, v: Array, y: Array) -> Blocks:
     """The third-order result, without the last stage, which counts only in the estimate."""
     return tableau.plus(v, y, WEIGHTS[:-1], tableau.stages(NODES[:-1], ROWS[:-1], s, t, h, v, y))
+
+
+def extension(s: Scaled, t: float, h: float, v: Array, y: Array) -> Increments:
+    """The coefficients of the powers of θ."""
+    return tableau.powers(EXTENSION, stages(s, t, h, v, y))

@@ -29,6 +29,12 @@ METHOD = Rosenbrock(
 )
 WEIGHTS = (*FIFTH, 1.0, 1.0)
 ERROR = (0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
+#: The weights of the powers of θ in the state at the share θ of a step: of third order (Hairer and Wanner, IV.7).
+EXTENSION = (
+    (11.3474595926725, -1.468861396321538, -22.2638352862366, -8.680657743674718, 2.025137723295662, 1.0),
+    (-10.802515422725985, 13.575710529290182, 51.23176182448225, 32.75999682175269, -7.619526849012534, 0.0),
+    (0.6762803392801253, -6.087714651680015, -16.43084320892478, -24.76722511418386, 6.594389125716872, 0.0),
+)
 
 
 def stages(s: Scaled, t: float, h: float, v: Array, y: Array) -> Increments:
@@ -39,3 +45,8 @@ def stages(s: Scaled, t: float, h: float, v: Array, y: Array) -> Increments:
 def step(s: Scaled, t: float, h: float, v: Array, y: Array) -> Blocks:
     """The fourth-order result, which is stiffly accurate."""
     return tableau.plus(v, y, WEIGHTS, stages(s, t, h, v, y))
+
+
+def extension(s: Scaled, t: float, h: float, v: Array, y: Array) -> Increments:
+    """The coefficients of the powers of θ."""
+    return tableau.powers(EXTENSION, stages(s, t, h, v, y))

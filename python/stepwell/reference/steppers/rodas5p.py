@@ -42,6 +42,49 @@ METHOD = Rosenbrock(
 )
 WEIGHTS = (*SIXTH, 1.0, 1.0, 1.0)
 ERROR = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
+#: The weights of the powers of θ in the state at the share θ of a step: of fourth order (Steinebach 2023).
+EXTENSION = (
+    (
+        18.445940457357736,
+        0.0038736602192955,
+        -1.193724251372219,
+        -2.550612778867943,
+        0.555146713329451,
+        2.1241088310450404,
+        1.4272876194431874,
+        0.8279777892984451,
+    ),
+    (
+        -35.86447536361557,
+        1.588978025173108,
+        -7.390011680591034,
+        -22.127299463947274,
+        19.65118979338797,
+        14.856554783201469,
+        -7.216327922863061,
+        -6.538213859221817,
+    ),
+    (
+        21.335592082873973,
+        3.856958974025215,
+        69.87757623566245,
+        104.62034291244223,
+        -72.24900970086169,
+        -75.7705998669138,
+        6.633213460592355,
+        11.593323255637094,
+    ),
+    (
+        -11.419903575922262,
+        -2.8879645146136994,
+        -72.92137995996029,
+        -80.12511834622643,
+        52.072871366152654,
+        59.78993625266729,
+        0.15582684282751913,
+        -4.883087185713722,
+    ),
+)
 
 
 def stages(s: Scaled, t: float, h: float, v: Array, y: Array) -> Increments:
@@ -52,3 +95,8 @@ def stages(s: Scaled, t: float, h: float, v: Array, y: Array) -> Increments:
 def step(s: Scaled, t: float, h: float, v: Array, y: Array) -> Blocks:
     """The fifth-order result, which is stiffly accurate."""
     return tableau.plus(v, y, WEIGHTS, stages(s, t, h, v, y))
+
+
+def extension(s: Scaled, t: float, h: float, v: Array, y: Array) -> Increments:
+    """The coefficients of the powers of θ."""
+    return tableau.powers(EXTENSION, stages(s, t, h, v, y))

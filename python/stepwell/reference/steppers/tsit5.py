@@ -25,6 +25,21 @@ ERROR = (
     0.45808210592918697,
     -0.015151515151515152,
 )
+#: The weights of the powers of θ in the state at the share θ of a step: of fourth order (Tsitouras 2011).
+EXTENSION = (
+    (1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
+    (
+        -2.763706197274826,
+        0.13169999999999998,
+        3.9302962368947516,
+        -12.411077166933676,
+        37.50931341651104,
+        -27.896526289197286,
+        1.5,
+    ),
+    (2.9132554618219126, -0.2234, -5.941033872131505, 30.33818863028232, -88.1789048947664, 65.09189467479366, -4.0),
+    (-1.0530884977290216, 0.1017, 2.490627285651253, -16.548102889244902, 47.37952196281928, -34.87065786149661, 2.5),
+)
 
 
 def stages(s: Scaled, t: float, h: float, v: Array, y: Array) -> Increments:
@@ -35,3 +50,8 @@ def stages(s: Scaled, t: float, h: float, v: Array, y: Array) -> Increments:
 def step(s: Scaled, t: float, h: float, v: Array, y: Array) -> Blocks:
     """The fifth-order result, without the last stage, which counts only in the estimate."""
     return tableau.plus(v, y, WEIGHTS[:-1], tableau.stages(NODES[:-1], ROWS[:-1], s, t, h, v, y))
+
+
+def extension(s: Scaled, t: float, h: float, v: Array, y: Array) -> Increments:
+    """The coefficients of the powers of θ."""
+    return tableau.powers(EXTENSION, stages(s, t, h, v, y))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from functools import partial
 from math import prod
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from .by_tape import blocks_of, evaluated, rows_of, tried_attempt
 from .plan import Plan, model
 
 if TYPE_CHECKING:
-    from ...reference.adaptive import Attempted, Jumps, Pace
+    from ...reference.adaptive import Attempted, Extension, Jumps, Pace
 
 #: The numbers of a ``Pace`` that are not of a group of components; those of groups follow: ``SCALES`` of each, the
 #: largest sizes first, and two tolerances if groups have their own. Last are those that a series keeps of each number of the
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 PACE_NUMBERS, SCALES = 20, 3
 #: Places among them; the counts are of accepted, rejected and extra steps.
 TIME, STEP, TARGET, EXTRA, HELD, RELATIVE, ABSOLUTE, LASTS, ERROR = 0, 1, 2, 3, 4, 5, 6, 7, 18
-INTERVAL, UNTIL, MOST_STEP, COUNTS, WORK = 9, 10, 11, slice(15, 18), 19
+INTERVAL, UNTIL, MOST_STEP, WALL, COUNTS, WORK = 9, 10, 11, 12, slice(15, 18), 19
 #: The first step if the state does not determine one, in units of time; in a run shorter than SHORT this part of its time. So
 #: steps of longer runs do not depend on the saved times.
 BLIND = 1.0 / (1 << 20)
@@ -77,7 +77,7 @@ class Pacing(NamedTuple):
     ``at`` and ``jumps``, the times that no step crosses, are the same for all members or one for each, shape (times, *batch).
     Every ``every``-th accepted step of a member is saved, 0 for none. The core has ``room`` for this many steps of each member,
     and a member that has filled it ends with the status ``FULL``. ``waypoints`` asks for where members stood on the way; or it is
-    those that a run that goes on has.
+    those that a run that goes on has. ``is_part`` is whether others follow the last time, which is then one as the others.
     """
 
     at: Array
@@ -87,16 +87,22 @@ class Pacing(NamedTuple):
     every: int = 0
     room: int = 0
     waypoints: bool | Array = False
+    is_part: bool = False
 
 
 class CorePacing(NamedTuple):
-    """``Pacing`` as the core takes it: rows of one number for all or for each member; jumps twice, before and after."""
+    """``Pacing`` as the core takes it: rows of one number for all or for each member; jumps twice, before and after.
+
+    ``extends`` is whether states before the last time are those of the continuous extension of the method.
+    """
 
     at: Array
     jumps: Array
     budget: int
     begins: bool
     every: int = 0
+    extends: bool = False
+    is_part: bool = False
 
 
 def jumps_of(plan: Plan, pacing: Pacing) -> Jumps | None:
@@ -116,7 +122,13 @@ def pacing_of_core(plan: Plan, pacing: Pacing) -> CorePacing:
     """``pacing`` as the core takes it."""
     jumps = jumps_of(plan, pacing)
     both = np.empty((0, 1)) if jumps is None else np.concatenate([_rows(jumps.before, plan), _rows(jumps.after, plan)])
-    return CorePacing(_rows(pacing.at, plan), both, pacing.budget, pacing.begins, pacing.every)
+    at, within = _rows(pacing.at, plan), looks_within(plan, pacing)
+    return CorePacing(at, both, pacing.budget, pacing.begins, pacing.every, within, pacing.is_part)
+
+
+def looks_within(plan: Plan, pacing: Pacing) -> bool:
+    """Whether states are those of the continuous extension of the method, if they are within a step."""
+    return (len(pacing.at) > 1 or pacing.is_part) and extends(plan)
 
 
 def _rows(times: Array, plan: Plan) -> Array:
@@ -362,6 +374,40 @@ def attempt_by_numpy(plan: Plan, budget: int) -> Any:
     return attempts(plan, attempted_system(plan))
 
 
+def extends(plan: Plan) -> bool:
+    """Whether states within a step are those of the continuous extension of the method.
+
+    Else each takes a step of its own: where it owes more than the extension knows of, as a projection and amounts that do not
+    become negative do; and in float32, where the roundings of stages, times weights of some hundreds, are as large as tolerances.
+    """
+    keeper = plan.system.keeper
+    projects = keeper is not None and not getattr(keeper, "acts_on_rates", True)
+    return plan.method.extension_evaluations > 0 and not (plan.single or plan.acceptance.positive or projects)
+
+
+def extension_by_numpy(plan: Plan) -> Any:
+    """A function of a pace, v, y and a time within the held step: the state there, and whether it is as good as a step's."""
+    from ...reference import adaptive
+
+    n, steps, system = prod(plan.system.v_shape) + prod(plan.system.y_shape), plan.method.steps, attempted_system(plan)
+    next_rows = evaluated(plan, "extension") if plan.by_tape else None
+
+    def made(pace: Pace, v: Array, y: Array) -> Extension:
+        if next_rows is None:
+            return adaptive.extension(cast("Any", steps), system, plan.block_axes, plan.acceptance, pace, v, y)
+        numbers = np.broadcast_arrays(*pace.numbers)
+        *rows, step, changes = next_rows([*rows_of(plan, v, y), *numbers], None)
+        terms = np.array(rows[n + len(numbers) :])
+        powers = [blocks_of(v, y, terms[first : first + n]) for first in range(0, len(terms), n)]
+        return adaptive.Extension(powers, step, changes > 0.0)
+
+    def state(pace: Pace, v: Array, y: Array, t: Any) -> tuple[Array, Array, Any]:
+        terms, step, changes = made(pace, v, y)
+        return *adaptive.within(terms, v, y, (t - pace.t) * (1.0 / step)), ~changes
+
+    return state
+
+
 def adapt(plan: Plan, pacing: Pacing, paces: Array, v: Array, y: Array, *, make: Callable[..., bool] | None = None) -> Adapted:
     """Step every member to its last time; ``paces`` has a column for each member, or one for all. ``make`` makes the steps."""
     make = _adapt_by_core if make is None else make
@@ -417,7 +463,9 @@ def _adapt_by_numpy(plan: Plan, pacing: Pacing, paces: Array, v: Array, y: Array
     series, numbers = plan.method.has_series, prod(plan.system.v_shape) + prod(plan.system.y_shape)
     waypoints = room_for_waypoints(pacing, numbers, pace_numbers(plan), plan.members)
     at, budget, every = pacing.at, pacing.budget, pacing.every
-    out = adaptive.run(attempt, v, y, pace, at=at, budget=budget, jumps=jumps, series=series, every=every, waypoints=waypoints)
+    extension = extension_by_numpy(plan) if looks_within(plan, pacing) else None
+    kept: dict[str, Any] = {"every": every, "waypoints": waypoints, "extension": extension, "is_part": pacing.is_part}
+    out = adaptive.run(attempt, v, y, pace, at=at, budget=budget, jumps=jumps, series=series, **kept)
     each = evaluations_of_attempt(plan)
     steps = _gathered(plan, out.steps) if pacing.every else None
     paces = numbers_of(out.pace)

@@ -24,7 +24,7 @@ Some = tuple[Mapping[int, Any], Sequence[Any]]
 
 
 def traced(plan: Plan, what: str) -> tuple[Tracer, Any, list[Any]]:
-    """Trace a method's "step", "attempt", the "tried" part of one, or "start" or "finish", from v to the carry or back.
+    """Trace a method's "step", "attempt", "extension", the "tried" part of an attempt, or "start" or "finish" of the carry.
 
     Returns the tracer, the tape, and the symbols of the next state.
     """
@@ -38,6 +38,8 @@ def traced(plan: Plan, what: str) -> tuple[Tracer, Any, list[Any]]:
             symbols = tracer.step(plan.method, plan.choice)
         case "attempt":
             symbols = tracer.attempt(plan.method, plan.order, plan.acceptance, backward=plan.backward)
+        case "extension":
+            symbols = tracer.extension(plan.method, plan.acceptance, backward=plan.backward)
         case "tried":
             symbols = tracer.tried(plan.method, backward=plan.backward)
         case _:

@@ -293,7 +293,7 @@ def within(plan: engine.Plan, system: Attempted, t: Any, h: Any, v: Any, y: Any)
     if plan.method.has_series:
         unit = longer(series_pace.unit_of(h), LEAST_UNIT)
         terms, share = expanded(system.unit, plan.order or steps.ORDER, t, (unit, unit), v, y)[0], h * (1.0 / unit)
-        v, y = (series_pace.value(start, [term[i] for term in terms], share) for i, start in enumerate((v, y)))
+        v, y = (tableau.polynomial(start, [term[i] for term in terms], share) for i, start in enumerate((v, y)))
     else:
         s = system.rates(h)
         s.axes = plan.block_axes

@@ -189,11 +189,14 @@ class Pieces:
         self._last: tuple[Run, Request] | None = None
         self._waypoints: Array | None = None
 
-    def make(self, *, observer: Any = None, **options: Any) -> Run:
-        """A piece of the run, without findings and warnings; ``observer`` is that of the plan."""
+    def make(self, *, observer: Any = None, goes_on: bool = False, **options: Any) -> Run:
+        """A piece of the run, without findings or warnings; ``observer`` is that of the plan. Others follow if it goes on."""
         waypoints: list[Array] = []
         request = Request.of(self.system, self._method, Options(**options))
         request = request._replace(plan=request.plan._replace(observer=observer))
+        if goes_on and request.step_control is not None:
+            control = request.step_control
+            request = request._replace(step_control=control._replace(pacing=control.pacing._replace(is_part=True)))
         run = step(request, waypoints if self._looks else None)
         self._last = run, request
         if waypoints:

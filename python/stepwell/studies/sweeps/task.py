@@ -337,7 +337,7 @@ def _pieces_between_times(
     going_on = start
     for first in range(0, task.at.size, length):
         _stop(stopped)
-        piece = pieces.make(at=task.at[first : first + length], **going_on)
+        piece = pieces.make(at=task.at[first : first + length], goes_on=first + length < task.at.size, **going_on)
         _as_many(piece, members)
         if first + length < task.at.size:
             going_on = _going_on(start, piece)

@@ -37,6 +37,7 @@ pub struct AdaptiveLanes {
     /// start.
     by_terms: Option<OneLane>,
     begin: Option<OneLane>,
+    extension: Option<Extension>,
     level: Level,
     budget: f64,
 }
@@ -70,10 +71,36 @@ impl OneLane {
     }
 }
 
+/// The continuous extension of a step.
+struct Extension {
+    stage: Arc<Stage>,
+    step: PreparedStage,
+    /// At the start of a step within which states are wanted: the rows of all that a lane is; and behind them, once they are asked
+    /// for, those of the coefficients, of the length of the step, and of whether it changes too much.
+    rows: Aligned,
+    is_known: bool,
+}
+
+impl Extension {
+    fn find(&mut self) {
+        if !self.is_known {
+            self.step.advance(&self.stage, &Clock::NONE, 0, 1, &mut self.rows);
+            self.is_known = true;
+        }
+    }
+}
+
 /// States of a lane within a step: see [`AdaptiveBatch::sum_terms`].
 struct Sums<'a> {
-    of: &'a AdaptiveLanes,
+    lanes: usize,
     lane: usize,
+    /// How many coefficients each number has.
+    order: usize,
+    /// Rows of the state and of the time; and, where rounding is compensated, of what it left out.
+    starts: &'a [f64],
+    low: Option<&'a [f64]>,
+    /// One over the unit of time of the coefficients.
+    per_unit: f64,
     terms: &'a [f64],
     times: &'a [f64; SIDE],
     states: &'a mut [[f64; SIDE]],
@@ -82,24 +109,31 @@ struct Sums<'a> {
 impl Task for Sums<'_> {
     #[inline(always)]
     fn run(self) {
-        let (lanes, n) = (self.of.step.lanes(), self.of.numbers);
-        let starts = &self.of.starts[self.lane..];
-        let (start, per_unit) = (starts[n * lanes], starts[(n + 1) * lanes]);
+        let (lanes, n) = (self.lanes, self.states.len());
+        let starts = &self.starts[self.lane..];
+        let start = starts[n * lanes];
         let mut shares = [0.0; SIDE];
         for (share, time) in shares.iter_mut().zip(self.times) {
-            *share = (time - start) * per_unit;
+            *share = (time - start) * self.per_unit;
         }
         for (i, number) in self.states.iter_mut().enumerate() {
-            let low = if self.of.compensated { starts[(n + 2 + i) * lanes] } else { 0.0 };
+            let low = self.low.map_or(0.0, |low| low[i * lanes + self.lane]);
             let terms = &self.terms[i * lanes + self.lane..];
-            *number = sums((starts[i * lanes], low), (terms, n * lanes), self.of.order, &shares);
+            *number = sums((starts[i * lanes], low), (terms, n * lanes), self.order, &shares);
         }
     }
 }
 
 impl AdaptiveLanes {
-    /// For a run of so many members.
-    pub fn new(traced: &Traced, spec: &Spec, level: Level, members: usize, budget: f64) -> Result<AdaptiveLanes, Error> {
+    /// For a run of so many members. With an extension, states within a step are those of it.
+    pub fn new(
+        traced: &Traced,
+        spec: &Spec,
+        level: Level,
+        members: usize,
+        budget: f64,
+        extends: bool,
+    ) -> Result<AdaptiveLanes, Error> {
         let tapes = traced.tapes()?;
         let step = PreparedStage::new(&tapes.step, spec, level, members, &Clock::NONE, budget);
         let StepKind::Attempts { acceptance, .. } = &traced.key().how else { return Err(Error::NoEstimate) };
@@ -108,7 +142,18 @@ impl AdaptiveLanes {
         let state = Aligned::new(all * step.lanes());
         let compensated = acceptance.compensated;
         let order = (all - numbers - Pace::<f64>::NUMBERS - scales) / numbers.max(1);
+        let extension = match extends {
+            true => {
+                let stage = traced.extension()?;
+                let compiled = stage.compiled_for_lanes(level, step.lanes());
+                let rows = Aligned::new(stage.split.body.next.len() * step.lanes());
+                let step = PreparedStage::with(&stage, compiled, spec, &Clock::NONE, budget);
+                Some(Extension { stage, step, rows, is_known: false })
+            }
+            false => None,
+        };
         Ok(AdaptiveLanes {
+            extension,
             state,
             starts: Vec::new(),
             step,
@@ -132,6 +177,9 @@ impl AdaptiveBatch for AdaptiveLanes {
 
     fn prepare_lane(&mut self, spec: &Spec, lane: usize, member: usize) {
         self.step.prepare_lane(&self.tapes.step, spec, lane, member);
+        if let Some(extension) = &mut self.extension {
+            extension.step.prepare_lane(&extension.stage, spec, lane, member);
+        }
     }
 
     fn set_state(&mut self, lane: usize, state: &[f64]) {
@@ -213,11 +261,16 @@ impl AdaptiveBatch for AdaptiveLanes {
     }
 
     fn has_sums(&self) -> bool {
-        self.tapes.sums
+        self.tapes.sums || self.extension.is_some()
     }
 
     fn keep_starts(&mut self) {
         let (lanes, n) = (self.step.lanes(), self.numbers);
+        if let Some(extension) = &mut self.extension {
+            extension.rows[..self.state.len()].copy_from_slice(&self.state);
+            extension.is_known = false;
+            return;
+        }
         let first = (n + Pace::<f64>::NUMBERS + self.scales) * lanes;
         self.starts.clear();
         self.starts.extend_from_slice(&self.state[..(n + 1) * lanes]); // the time stands behind the state
@@ -228,9 +281,33 @@ impl AdaptiveBatch for AdaptiveLanes {
         }
     }
 
-    fn sum_terms(&self, lane: usize, times: &[f64; SIDE], states: &mut [[f64; SIDE]]) {
-        let first = (self.numbers + Pace::<f64>::NUMBERS + self.scales) * self.step.lanes();
-        let sums = Sums { of: self, lane, terms: &self.state[first..], times, states };
+    fn changes_within(&mut self, lane: usize) -> bool {
+        let Some(extension) = &mut self.extension else { return false };
+        extension.find();
+        extension.rows[extension.rows.len() - self.step.lanes() + lane] > 0.0
+    }
+
+    fn restore(&mut self, lane: usize) {
+        let (Some(extension), lanes) = (&self.extension, self.step.lanes()) else { return };
+        for (row, kept) in self.state.chunks_exact_mut(lanes).zip(extension.rows.chunks_exact(lanes)) {
+            row[lane] = kept[lane];
+        }
+    }
+
+    fn sum_terms(&mut self, lane: usize, times: &[f64; SIDE], states: &mut [[f64; SIDE]]) {
+        let (lanes, n) = (self.step.lanes(), self.numbers);
+        let sums = if let Some(extension) = &mut self.extension {
+            extension.find();
+            let (starts, behind) = extension.rows.split_at(self.state.len());
+            let (terms, step) = behind.split_at(behind.len() - 2 * lanes);
+            let (order, per_unit) = (terms.len() / lanes / n.max(1), 1.0 / step[lane]);
+            Sums { lanes, lane, order, starts, low: None, per_unit, terms, times, states }
+        } else {
+            let (terms, starts) = (&self.state[(n + Pace::<f64>::NUMBERS + self.scales) * lanes..], &self.starts);
+            let low = self.compensated.then(|| &starts[(n + 2) * lanes..]);
+            let per_unit = starts[(n + 1) * lanes + lane];
+            Sums { lanes, lane, order: self.order, starts, low, per_unit, terms, times, states }
+        };
         with_isa!(self.level.of_loops(), |isa| isa.run(sums));
     }
 

@@ -153,7 +153,8 @@ pub trait AdaptiveBatch: Send {
     /// One attempt of one lane, at the start of a step whose coefficients are known.
     fn attempt_by_terms(&mut self, _spec: &Spec, _lane: usize, _member: usize) {}
 
-    /// Whether states within a step are sums of its coefficients alone, which [`AdaptiveBatch::sum_terms`] makes.
+    /// Whether states within a step are sums of its coefficients alone, which [`AdaptiveBatch::sum_terms`] makes: those of a
+    /// series, or of the continuous extension of a method.
     fn has_sums(&self) -> bool {
         false
     }
@@ -161,8 +162,16 @@ pub trait AdaptiveBatch: Send {
     /// Keeps where lanes stand, before an attempt of a step within which states are wanted.
     fn keep_starts(&mut self) {}
 
+    /// Whether a number of a lane changes too much in that step for its states to be such sums.
+    fn changes_within(&mut self, _lane: usize) -> bool {
+        false
+    }
+
+    /// Puts a lane to where that step began.
+    fn restore(&mut self, _lane: usize) {}
+
     /// The states of one lane at times within the step that began at the start that was kept, number by number.
-    fn sum_terms(&self, _lane: usize, _times: &[f64; SIDE], _states: &mut [[f64; SIDE]]) {}
+    fn sum_terms(&mut self, _lane: usize, _times: &[f64; SIDE], _states: &mut [[f64; SIDE]]) {}
 
     /// Sets the flag at which an attempt that may take long stops early.
     fn set_stop_flag(&mut self, _stop: &Stop) {}

@@ -28,6 +28,8 @@ pub struct Schedules {
     pub start: Option<BlockSchedule>,
     /// Turns what the method carries into velocities.
     pub finish: Option<BlockSchedule>,
+    /// The coefficients of the continuous extension of an attempt.
+    pub extension: Option<BlockSchedule>,
     /// Of each block that the method keeps, whether it has the numbers of v.
     pub kept: Vec<bool>,
 }
@@ -66,6 +68,7 @@ impl Schedules {
             step: schedule(step.ok_or(Error::NoEstimate)?),
             start: choice.and_then(|choice| method.start(choice)).map(of_slot),
             finish: choice.and_then(|choice| method.finish(choice)).map(of_slot),
+            extension: method.extension().filter(|_| choice.is_none()).map(schedule),
             kept: method.kept.clone(),
         })
     }
@@ -74,7 +77,7 @@ impl Schedules {
         [Some(&self.step), self.start.as_ref(), self.finish.as_ref()].into_iter().flatten()
     }
 
-    /// StepKind many rows an arena for all of them has.
+    /// How many rows an arena for all of them has, but for the extension, which has one of its own.
     fn rows(&self) -> usize {
         self.all().map(|schedule| schedule.rows).max().unwrap_or(2)
     }

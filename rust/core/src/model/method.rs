@@ -39,6 +39,9 @@ pub struct Record {
 /// A function from a state to two blocks, one in place of v and one in place of y.
 pub(crate) type Blocks = fn(Rates, Time, Length, Block, Block) -> (Block, Block);
 
+/// A function from a state to blocks of v and y, one pair for each power.
+pub(crate) type Powers = fn(Rates, Time, Length, Block, Block) -> Vec<(Block, Block)>;
+
 /// What a method needs from a system.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Needs {
@@ -71,6 +74,8 @@ pub struct Estimate {
     /// A second estimate, of other weights of the same stages, beside which the first may not be next to nothing by chance. One
     /// of lower order corrects a first of more than the fifth, so that both together behave as one of the method's order.
     pub coarse: Option<Blocks>,
+    /// The coefficients of the powers of θ in the state at the share θ of a step; none where that takes a step of its own.
+    pub extension: Option<Powers>,
 }
 
 /// A fact about a method, to be shown.
@@ -104,6 +109,7 @@ impl Record {
             ("order", Fact::Whole(Some(self.order as usize))),
             ("evaluations", Fact::Whole(Some(program.evaluations()))),
             ("attempt_evaluations", Fact::Whole(Some(self.attempt().map_or(0, |attempt| attempt.evaluations())))),
+            ("extension_evaluations", Fact::Whole(Some(self.extension().map_or(0, |program| program.evaluations())))),
             ("family", Fact::Text(self.family)),
             ("limit", Fact::Number(self.limit)),
             ("nodes", Fact::Numbers(program.nodes(self.needs == Needs::Rates))),
@@ -139,6 +145,12 @@ impl Record {
             }
             results
         }))
+    }
+
+    /// The program of the coefficients of the continuous extension: results are those of v and of y, power by power.
+    pub fn extension(&self) -> Option<Program> {
+        let extension = self.estimate.as_ref()?.extension?;
+        Some(Program::record(|s, t, h, v, y| extension(s, t, h, v, y).into_iter().flat_map(|(v, y)| [v, y]).collect()))
     }
 
     /// The program that turns a velocity into what the method carries.

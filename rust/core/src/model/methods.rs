@@ -27,6 +27,8 @@ pub struct Method {
     step: Program,
     /// An attempt: results are the new v and y and the estimates of their errors, two or four blocks.
     attempt: Option<Program>,
+    /// The coefficients of its continuous extension: results are those of v and of y, power by power.
+    extension: Option<Program>,
     /// Of each way to start the program that turns a velocity into what the v slot holds between steps, with the blocks that are
     /// kept behind it.
     starts: Vec<Program>,
@@ -44,6 +46,7 @@ impl From<&Record> for Method {
             error_order: record.estimate.as_ref().map(|estimate| estimate.order),
             step: record.program(),
             attempt: record.attempt(),
+            extension: record.extension(),
             kept: Vec::new(),
             starts: ways.clone().filter_map(|choice| record.start(choice)).collect(),
             finishes: ways.filter_map(|choice| record.finish(choice)).collect(),
@@ -66,7 +69,7 @@ impl Method {
         // Errors name methods by names that live as long as the process; a user defines a handful.
         let (name, kept) = (name.to_owned().leak(), kept.unwrap_or_default());
         let (starts, finishes) = (start.into_iter().collect(), Vec::new());
-        Method { name, needs, carries: false, kept, error_order, step, attempt, starts, finishes }
+        Method { name, needs, carries: false, kept, error_order, step, attempt, extension: None, starts, finishes }
     }
 
     /// The program of a step.
@@ -77,6 +80,11 @@ impl Method {
     /// The program of an attempt, if it estimates its error.
     pub fn attempt(&self) -> Option<&Program> {
         self.attempt.as_ref()
+    }
+
+    /// The program of the coefficients of the continuous extension, if it has one.
+    pub fn extension(&self) -> Option<&Program> {
+        self.extension.as_ref()
     }
 
     /// The program that turns a velocity into what the method carries, with the blocks that it keeps behind it.

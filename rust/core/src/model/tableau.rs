@@ -14,7 +14,19 @@ pub struct Tableau {
 impl Tableau {
     /// The increments of both blocks, one stage after the other.
     pub(crate) fn stages(&self, s: Rates, t: Time, h: Length, v: Block, y: Block) -> Vec<(Block, Block)> {
-        let mut found = Vec::with_capacity(self.nodes.len());
+        self.stages_after(Vec::with_capacity(self.nodes.len()), s, t, h, v, y)
+    }
+
+    /// Those and others before them, on which they may depend.
+    pub(crate) fn stages_after(
+        &self,
+        mut found: Vec<(Block, Block)>,
+        s: Rates,
+        t: Time,
+        h: Length,
+        v: Block,
+        y: Block,
+    ) -> Vec<(Block, Block)> {
         for (&node, row) in self.nodes.iter().zip(self.rows) {
             let at = t + node * h;
             let (vi, yi) = if row.is_empty() { (v, y) } else { plus(v, y, row, &found) };
@@ -28,6 +40,11 @@ impl Tableau {
 pub(crate) fn plus(v: Block, y: Block, weights: &[f64], increments: &[(Block, Block)]) -> (Block, Block) {
     let (dv, dy) = combined(weights, increments);
     (v + dv, y + dy)
+}
+
+/// The coefficients of the powers of θ in the state at the share θ of a step: a continuous extension of the method.
+pub(crate) fn powers(weights: &[&[f64]], increments: &[(Block, Block)]) -> Vec<(Block, Block)> {
+    weights.iter().map(|row| combined(row, increments)).collect()
 }
 
 /// The weighted sums of the increments of both blocks, from the left. Panics if all weights are zero.

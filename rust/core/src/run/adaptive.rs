@@ -4,7 +4,7 @@ mod events;
 
 use std::{ops::Range, sync::Arc};
 
-use self::events::{HeldEnd, Looks, length};
+use self::events::{HeldEnd, Looks};
 
 use super::{
     adaptive_plan::{Assignment, Part, Status},
@@ -17,7 +17,12 @@ use crate::{
     events::watch::Stop as EventStop,
     group::AdaptiveBatch,
     stage::{Machine, Stop},
-    step::{key::StepKind, pace::Pace, series_pace::SIDE, tapes::Traced},
+    step::{
+        key::StepKind,
+        pace::{Pace, length},
+        series_pace::SIDE,
+        tapes::Traced,
+    },
 };
 
 pub use super::adaptive_plan::{AdaptiveRun, Arrays};
@@ -102,7 +107,7 @@ impl Prepared {
         let traced = plan.model.traced()?;
         plan.model.room(traced.shape, 1)?;
         let machine = Machine { threads: 1, ..plan.machine };
-        let group = plan.model.adaptive(&traced, machine, plan.members, plan.budget as f64)?;
+        let group = plan.model.adaptive(&traced, machine, plan.members, plan.budget as f64, plan.extends)?;
         let most_checks = MOST_OPERATIONS / (traced.operations.1 * MOST_ATTEMPTS * group.lanes()).max(1);
         Ok((!plan.begins || group.begins()).then_some(Prepared { group: Some(group), most_checks }))
     }
@@ -144,7 +149,7 @@ impl<'a> Worker<'a> {
     fn new(plan: &'a AdaptiveRun<'a>, traced: &Arc<Traced>, stop: &Stop) -> Result<Self, Error> {
         let threads = if plan.members == 1 { plan.machine.threads } else { 1 };
         let machine = Machine { threads, ..plan.machine };
-        let mut group = plan.model.adaptive(traced, machine, plan.members, plan.budget as f64)?;
+        let mut group = plan.model.adaptive(traced, machine, plan.members, plan.budget as f64, plan.extends)?;
         group.set_stop_flag(stop);
         Ok(Worker::of(plan, group))
     }
@@ -460,8 +465,10 @@ impl<'a> Worker<'a> {
                     self.save(part, lane, &assigned);
                     assigned.next += 1;
                     self.group.set_state(lane, &origin);
-                } else if let Some(looks) = &mut self.looks {
-                    looks.watch.has_other_steps(part.first + assigned.member);
+                } else {
+                    assigned.by_steps = false;
+                    let member = part.first + assigned.member;
+                    self.looks.iter_mut().for_each(|looks| looks.watch.has_other_steps(member));
                 }
             }
             if !plan.jumps.is_empty() {
@@ -487,7 +494,25 @@ impl<'a> Worker<'a> {
             }
             if !is_full && assigned.next < plan.at.len() {
                 if self.group.has_sums() {
-                    pace.target = self.last(part.first + assigned.member);
+                    let last = self.last(part.first + assigned.member);
+                    let before = if plan.is_part { f64::INFINITY } else { last };
+                    let mut is_within = pace.target < before && pace.holds();
+                    if is_within && !assigned.by_steps {
+                        self.group.keep_starts();
+                        assigned.by_steps = self.group.changes_within(lane);
+                        if !assigned.by_steps {
+                            // No more than these times come before the last, to which a step is made.
+                            self.save_sums(part, lane, &mut assigned, pace.reach().0.min(before));
+                            if assigned.next == plan.at.len() {
+                                continue;
+                            }
+                            is_within = false;
+                        }
+                    }
+                    assigned.by_steps &= is_within || pace.held <= 0.0;
+                    if !assigned.by_steps {
+                        pace.target = last;
+                    }
                 }
                 if pace.holds() {
                     pace.extra = pace.target - pace.t;
@@ -573,7 +598,8 @@ impl<'a> Worker<'a> {
         let (t, rejected, is_held) = (at(t), at(rejected), at(held) > 0.0);
         let is_next = assigned.origin.as_ref().map_or(at(until) == target, |(_, before)| rejected <= *before);
         let holds = target < (t + at(h)).min(at(wall));
-        let is_other = assigned.stop.is_some() || self.plan.every > 0 || self.group.has_terms();
+        let is_within = self.group.has_sums() && next + usize::from(!self.plan.is_part) < self.plan.at.len();
+        let is_other = assigned.stop.is_some() || self.plan.every > 0 || self.group.has_terms() || is_within;
         if !is_next || !is_held || is_other || self.group.row_mut(until).is_none() {
             return false;
         }
@@ -603,7 +629,13 @@ impl<'a> Worker<'a> {
 
     /// Counts so many extra steps of a lane.
     fn count_extra(&mut self, lane: usize, steps: usize) {
-        self.group.row_mut(self.places.extra_steps).into_iter().for_each(|row| row[lane] += steps as f64);
+        match self.group.row_mut(self.places.extra_steps) {
+            Some(row) => row[lane] += steps as f64,
+            None => {
+                let pace = self.group.pace(lane);
+                self.group.set_pace(lane, Pace { extra_steps: pace.extra_steps + steps as f64, ..pace });
+            }
+        }
     }
 
     /// Saves the states of a lane at times before the end of a step whose start was kept, as sums of its coefficients. Returns how
@@ -638,13 +670,24 @@ impl<'a> Worker<'a> {
 
     /// Saves the states within the steps that lanes have just made, and at their ends.
     fn save_within(&mut self, part: &mut Part, assignments: &mut [Option<Assignment>]) {
-        let ends = self.group.row(self.places.t).map_or_else(Vec::new, <[f64]>::to_vec);
+        let ends: Vec<f64> = match self.group.row(self.places.t) {
+            Some(row) => row.to_vec(),
+            None => (0..assignments.len()).map(|lane| self.group.pace(lane).t).collect(),
+        };
         for ((lane, assigned), end) in assignments.iter_mut().enumerate().zip(ends) {
-            let Some(assigned) = assigned else { continue };
+            let Some(assigned) = assigned.as_mut().filter(|assigned| assigned.origin.is_none()) else { continue };
             let member = part.first + assigned.member;
-            if self.plan.at.get(assigned.next).is_some_and(|row| row.at(member) < end) {
+            if let Some(target) = self.plan.at.get(assigned.next).map(|row| row.at(member)).filter(|target| *target < end) {
+                if self.group.changes_within(lane) {
+                    self.group.restore(lane); // the step is made again, and held
+                    let pace = self.group.pace(lane);
+                    self.group.set_pace(lane, Pace { target, ..pace });
+                    assigned.by_steps = true;
+                    continue;
+                }
                 let saved = self.save_sums(part, lane, assigned, end);
-                self.count_extra(lane, saved + 1); // with the step, as if it had been held
+                // As if the step had been held, and of a series its states had been made by extra steps.
+                self.count_extra(lane, if self.group.has_terms() { saved + 1 } else { 1 });
             }
             while self.plan.at.get(assigned.next).is_some_and(|row| row.at(member) <= end) {
                 self.save(part, lane, assigned);

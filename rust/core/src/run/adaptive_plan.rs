@@ -25,6 +25,10 @@ pub struct AdaptiveRun<'a> {
     pub paces: Vec<Row<'a>>,
     /// Whether the steps to try first and the lengths of the blocks are still to be found: see `Pace::begun`.
     pub begins: bool,
+    /// Whether states before the last time are those of the continuous extension of the method, which it then has.
+    pub extends: bool,
+    /// Whether the run goes on after the last time, which is then one as the others.
+    pub is_part: bool,
     /// The most attempts of a member.
     pub budget: i64,
     /// Every so manieth accepted step is kept in [`Arrays::steps`]; 0 for none. A member that has filled its rows there ends, with
@@ -155,6 +159,8 @@ pub(super) struct Assignment {
     pub(super) kept_steps: usize,
     /// How many accepted steps it had when a waypoint was looked for last.
     pub(super) passed: u64,
+    /// States within the step that comes next, or is held, are made by steps.
+    pub(super) by_steps: bool,
     /// Where an event stops it.
     pub(super) stop: Option<Stop>,
 }
@@ -162,6 +168,16 @@ pub(super) struct Assignment {
 impl Assignment {
     /// Of a member of the log of attempts.
     pub(super) fn of_log(member: usize, next: usize) -> Assignment {
-        Assignment { member, next, origin: None, held_before: false, accepted: 0.0, kept_steps: 0, passed: 0, stop: None }
+        Assignment {
+            member,
+            next,
+            origin: None,
+            held_before: false,
+            accepted: 0.0,
+            kept_steps: 0,
+            passed: 0,
+            by_steps: false,
+            stop: None,
+        }
     }
 }

@@ -156,6 +156,7 @@ impl Model<'_> {
         machine: Machine,
         members: usize,
         budget: f64,
+        extends: bool,
     ) -> Result<Box<dyn AdaptiveBatch>, Error> {
         let (spec, level) = (&self.spec, machine.level);
         let signature = &self.key.signature;
@@ -164,7 +165,7 @@ impl Model<'_> {
                 return Ok(Box::new(SingleLanes::new(traced, spec, level, members, budget)?));
             }
             StepStrategy::Tape | StepStrategy::Matrix => {
-                return Ok(Box::new(AdaptiveLanes::new(traced, spec, level, members, budget)?));
+                return Ok(Box::new(AdaptiveLanes::new(traced, spec, level, members, budget, extends)?));
             }
             // Tapes of rates are scaled to a step of 1, and what a control pushes depends on the step.
             _ if signature.equations.as_ref().is_some_and(|equations| equations.reads_step()) => {
@@ -187,7 +188,7 @@ impl Model<'_> {
         };
         let rates = with_equations(rates, &self.key, spec, traced.shape, level, &Clock::NONE)?;
         let schedules = Schedules::of(&self.key.how, rates.traits(), traced.shape)?;
-        Ok(Box::new(LargeAdaptive::new(schedules, rates, traced, level, budget)?))
+        Ok(Box::new(LargeAdaptive::new(schedules, rates, traced, level, budget, extends)?))
     }
 }
 

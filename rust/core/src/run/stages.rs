@@ -17,7 +17,7 @@ pub struct Stages {
     pub sizes: [(&'static str, usize); 6],
     /// Whether the method has a carry instead of v between steps.
     pub carries: bool,
-    /// Each by its name: "step", and, where there is one, "start", "finish", "record", "begin", "judged" and "by terms".
+    /// Each by its name: "step", and, where there is one, "start", "finish", "record", "begin", "judged", "by terms" and "extension".
     pub splits: Vec<(&'static str, Split)>,
     /// Of attempts of float32, where their rows stand: numbers of the state, sampled inputs, results of the first part, and numbers
     /// of the second before these.
@@ -25,13 +25,17 @@ pub struct Stages {
 }
 
 impl Model<'_> {
-    /// The stages of a run, each as one tape, however long.
-    pub fn stages(&self) -> Result<Stages, Error> {
+    /// The stages of a run, each as one tape, however long; with the continuous extension of attempts where it `extends`.
+    pub fn stages(&self, extends: bool) -> Result<Stages, Error> {
         let traced = self.traced()?;
-        match self.key.precision {
-            Precision::Double => Ok(stages(&traced, &*traced.tapes_of::<f64>()?)),
-            Precision::Single => Ok(stages(&traced, &*traced.tapes_of::<f32>()?)),
+        let mut made = match self.key.precision {
+            Precision::Double => stages(&traced, &*traced.tapes_of::<f64>()?),
+            Precision::Single => stages(&traced, &*traced.tapes_of::<f32>()?),
+        };
+        if extends {
+            made.splits.push(("extension", traced.extension()?.split.clone()));
         }
+        Ok(made)
     }
 }
 

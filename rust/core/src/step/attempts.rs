@@ -2,7 +2,9 @@
 
 use super::{
     leaves::{block, ids, parameters},
-    pace::{Acceptance, Attempted, Backward, Made, Pace, SINGLE_ROUNDING, Scales, Stretched, attempt, judge, taken},
+    pace::{
+        Acceptance, Attempted, Backward, Made, Pace, SINGLE_ROUNDING, Scales, Stretched, attempt, changes_within, judge, taken,
+    },
     series_pace,
 };
 use crate::{
@@ -150,6 +152,25 @@ impl AttemptsOf<'_> {
         let mut next = ids([&v, &y, &given]);
         next.extend(ids(made.iter().chain(&projected)));
         next.push(work.0);
+        next
+    }
+
+    /// The continuous extension of the next step, behind the state and the pace, which stay: its coefficients, how long the step is,
+    /// and whether a group changes too much in it.
+    pub(crate) fn extension(&self, program: &Program) -> Vec<Id> {
+        let ((v, y), (pace, scales)) = (self.state(), self.pace());
+        let step = pace.reach().0 - pace.t;
+        let terms = program.run(self.rates(step).as_ref(), pace.t, step, &v, &y);
+        let end = |start: &Block<Symbol>, first: usize| {
+            let powers = terms.iter().skip(first).step_by(2);
+            let change = series_pace::value(&start.map(|_| Symbol::of(0.0)), powers, Symbol::of(1.0));
+            start.zip_map(&change, |start, change| start + change)
+        };
+        let sizes = |v: &Block<Symbol>, y: &Block<Symbol>| self.acceptance.sizes(v.as_slice(), y.as_slice());
+        let changes = changes_within(&pace, &scales, &sizes(&v, &y), &sizes(&end(&v, 0), &end(&y, 1)));
+        let mut next = Self::next((&pace, &scales), &v, &y);
+        next.extend(ids(&terms));
+        next.extend([step.0, Symbol::choose(changes, Symbol::of(1.0), Symbol::of(0.0)).0]);
         next
     }
 

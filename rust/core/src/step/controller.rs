@@ -38,9 +38,9 @@ macro_rules! numbers {
 
 numbers! {
     /// The time of a member and the state of its step-size controller. Steps do not depend on the saved times: a step that
-    /// passes the next of them is held, not taken, until the states within it are saved. Each is computed by an extra step from
-    /// the start of the held one. An extra step whose error is not tolerated shows that the held one missed something: that one
-    /// is then rejected.
+    /// passes the next of them is held, not taken, until the states within it are saved, by the continuous extension of the method.
+    /// The last of them, and all where there is no extension, are made by extra steps from the start of the held one. An extra
+    /// step whose error is not tolerated shows that the held one missed something: that one is then rejected.
     pub struct Pace {
         /// Its time.
         t,
@@ -76,13 +76,23 @@ numbers! {
         accepted,
         /// Rejected attempts.
         rejected,
-        /// Steps for saved states: the extra ones, and those that were held and are made once more.
+        /// Steps for saved states: the extra ones, and those that were held and are made once more or extended.
         extra_steps,
         /// The last error over the tolerance.
         error,
         /// The energy that a control or projection added in accepted steps; for a control the sum over their evaluations.
         work,
     }
+}
+
+/// How long a step is that ends at the wall if it would cross it.
+pub(crate) fn length(t: f64, h: f64, wall: f64) -> f64 {
+    if wall < t + h { wall - t } else { h }
+}
+
+/// Where a step ends that does not cross the wall.
+pub(crate) fn reach(t: f64, h: f64, wall: f64) -> f64 {
+    if wall < t + h { wall } else { t + h }
 }
 
 /// The next attempt.

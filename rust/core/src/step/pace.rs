@@ -6,7 +6,7 @@ use super::controller::{MIN_FACTOR, MOVES};
 pub use super::{acceptance::Acceptance, controller::Pace};
 pub(crate) use super::{
     acceptance::Scales,
-    controller::{MAX_FACTOR, Outlook},
+    controller::{MAX_FACTOR, Outlook, length, reach},
     sizes::{largest, longer, total},
 };
 use crate::{
@@ -82,6 +82,8 @@ const SMOOTH: f64 = 32.0;
 /// within the step, of which the method happens to be exact.
 const WILD: f64 = 0.5;
 const CHANCE: f64 = 1024.0;
+/// See `reference/adaptive/pace.py`.
+const CHANGES: f64 = 32.0;
 /// The error over the tolerance that a step counts as which makes a component negative that has to stay positive.
 const OUTSIDE: f64 = 16.0;
 
@@ -255,6 +257,17 @@ pub(crate) fn attempt<N: Number>(
 /// The new block if the state goes on, else the old one.
 pub(crate) fn taken<N: Number>(took: N::Truth, new: &Block<N>, old: &Block<N>) -> Block<N> {
     new.zip_map(old, |new, old| N::choose(took, new, old))
+}
+
+/// Whether a group changes so much in a step, from these sizes to those, that states within it are better made by steps.
+pub(crate) fn changes_within<N: Number>(pace: &Pace<N>, scales: &Scales<N>, old: &[N], new: &[N]) -> N::Truth {
+    let share = |(group, (old, new)): (usize, (&N, &N))| {
+        let (larger, smaller) = (longer(*old, *new), N::choose(new.below(*old), *new, *old));
+        let share = (N::of(CHANGES) * scales.tolerances(group, pace)[0]) * larger / smaller;
+        N::choose(larger.at_most(N::of(0.0)), N::of(0.0), share)
+    };
+    let shares: Vec<N> = old.iter().zip(new).enumerate().map(share).collect();
+    N::of(0.0).below(pace.lasts) & !largest(&shares).at_most(N::of(1.0))
 }
 
 /// What comes after an attempt, and whether the state goes on. `counts` are how many groups v and y have.

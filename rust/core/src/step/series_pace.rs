@@ -124,7 +124,7 @@ fn unit_of<N: Number>(step: N) -> N {
 
 /// The sum of a series at a distance. Odd and even powers are summed apart by Horner's rule, which takes half the time of one
 /// sum; the start comes last, so that it is rounded once.
-fn value<'a, N: Number + 'a>(start: &Block<N>, terms: impl Iterator<Item = &'a Block<N>>, share: N) -> Block<N> {
+pub(crate) fn value<'a, N: Number + 'a>(start: &Block<N>, terms: impl Iterator<Item = &'a Block<N>>, share: N) -> Block<N> {
     let square = share * share;
     let terms: Vec<&Block<N>> = terms.collect();
     let sum = |first: usize| {

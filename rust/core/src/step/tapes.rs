@@ -14,7 +14,7 @@ use super::{
         MAX_IMPLICIT_OPERATIONS, MAX_IMPLICIT_TAPE_OPERATIONS, MAX_TAPE_OPERATIONS, MAX_UNKNOWNS, Operations, has_derivatives,
         has_series, has_splitting, operations, recorded, shape,
     },
-    trace::{trace_begin, trace_by_terms, trace_judged, trace_record, trace_slot, trace_step},
+    trace::{trace_begin, trace_by_terms, trace_extension, trace_judged, trace_record, trace_slot, trace_step},
     watch,
 };
 use crate::{
@@ -87,6 +87,7 @@ pub struct Traced {
     tapes: OnceLock<Arc<Tapes>>,
     /// The same for numbers of 32 bits.
     singles: OnceLock<Arc<Tapes<f32>>>,
+    extension: OnceLock<Arc<Stage>>,
 }
 
 impl TapeKey {
@@ -158,6 +159,7 @@ impl TapeKey {
                 operations,
                 tapes: OnceLock::new(),
                 singles: OnceLock::new(),
+                extension: OnceLock::new(),
                 key: self.clone(),
             };
             let is_one = series || own_times || self.fused || matches!(self.how, StepKind::Step(_));
@@ -192,6 +194,17 @@ impl Traced {
     /// The tapes of all that a run needs.
     pub fn tapes(&self) -> Result<Arc<Tapes>, Error> {
         self.tapes_of()
+    }
+
+    /// The tape of the continuous extension of an attempt; few runs need it.
+    pub(crate) fn extension(&self) -> Result<Arc<Stage>, Error> {
+        if let Some(known) = self.extension.get() {
+            return Ok(Arc::clone(known));
+        }
+        let (tape, next) = trace_extension(Tape::default(), &self.key.signature, &self.key.how)?;
+        let traced = if self.key.fused { fuse(&tape, &next) } else { (tape, next) };
+        let stage = Arc::new(Stage::cut(&self.key.signature, &traced));
+        Ok(Arc::clone(self.extension.get_or_init(|| stage)))
     }
 
     /// The same, for numbers of the key's precision.

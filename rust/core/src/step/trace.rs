@@ -154,6 +154,15 @@ pub(super) fn trace_begin(tape: Tape, signature: &Signature, how: &StepKind) -> 
     Ok(record(tape, || attempts.begin(series)))
 }
 
+/// Traces the coefficients of the continuous extension of a step, onto a tape that may hold something already.
+pub(super) fn trace_extension(tape: Tape, signature: &Signature, how: &StepKind) -> Result<(Tape, Vec<Id>), Error> {
+    let StepKind::Attempts { name, acceptance, backward, .. } = how else { return Err(Error::NoEstimate) };
+    let (shape, kind, method) = (shape(signature, how)?, kind(signature)?, method(name)?);
+    let program = method.extension().ok_or(Error::NoEstimate)?;
+    let attempts = AttemptsOf { kind, signature, shape, acceptance, backward: *backward };
+    Ok(record(tape, || attempts.extension(program)))
+}
+
 /// Traces an attempt by coefficients that stand behind the rest of the state, where they stay; and whether what they sum up to is
 /// projected.
 pub(super) fn trace_by_terms(
@@ -256,7 +265,7 @@ pub(crate) fn trace_record(tape: Tape, signature: &Signature, names: &[String]) 
     }))
 }
 
-/// Traces a part of a scene by its name, for comparisons: "step", "attempt", its second part "judged", "begin", "start" and "finish" with the number of a
+/// Traces a part of a scene by its name, for comparisons: "step", "attempt", its second part "judged", its "extension", "begin", "start" and "finish" with the number of a
 /// way to start behind them, or "record" with a quantity behind it.
 pub fn trace(tape: Tape, signature: &Signature, how: &StepKind, what: &str) -> Result<(Tape, Vec<Id>), Error> {
     let (what, which) = what.split_once(' ').unwrap_or((what, ""));
@@ -272,6 +281,7 @@ pub fn trace(tape: Tape, signature: &Signature, how: &StepKind, what: &str) -> R
             trace_step(tape, signature, how).map(|steps| (steps.tape, steps.next))
         }
         "judged" => trace_judged(tape, signature, how).map(|(tape, next, _)| (tape, next)),
+        "extension" => trace_extension(tape, signature, how),
         "begin" => trace_begin(tape, signature, how),
         "start" | "finish" => {
             let method = method(name)?;

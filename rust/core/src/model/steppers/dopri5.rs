@@ -1,7 +1,7 @@
 use crate::model::{
     method::{Estimate, Needs, Record},
     program::{Block, Length, Rates, Time},
-    tableau::{Tableau, combined, plus},
+    tableau::{Tableau, combined, plus, powers},
 };
 
 const TABLEAU: Tableau = Tableau {
@@ -19,6 +19,22 @@ const TABLEAU: Tableau = Tableau {
 const WEIGHTS: &[f64] = &[35.0 / 384.0, 0.0, 500.0 / 1113.0, 125.0 / 192.0, -2187.0 / 6784.0, 11.0 / 84.0, 0.0];
 /// The fifth-order result less the fourth-order one.
 const ERROR: &[f64] = &[71.0 / 57600.0, 0.0, -71.0 / 16695.0, 71.0 / 1920.0, -17253.0 / 339200.0, 22.0 / 525.0, -1.0 / 40.0];
+/// The weights of the powers of θ in the state at the share θ of a step: see the reference.
+const EXTENSION: &[&[f64]] = &[
+    &[1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+    &[
+        -8048581381.0 / 2820520608.0, 0.0, 131558114200.0 / 32700410799.0, -1754552775.0 / 470086768.0,
+        127303824393.0 / 49829197408.0, -282668133.0 / 205662961.0, 40617522.0 / 29380423.0,
+    ],
+    &[
+        8663915743.0 / 2820520608.0, 0.0, -68118460800.0 / 10900136933.0, 14199869525.0 / 1410260304.0,
+        -318862633887.0 / 49829197408.0, 2019193451.0 / 616988883.0, -110615467.0 / 29380423.0,
+    ],
+    &[
+        -12715105075.0 / 11282082432.0, 0.0, 87487479700.0 / 32700410799.0, -10690763975.0 / 1880347072.0,
+        701980252875.0 / 199316789632.0, -1453857185.0 / 822651844.0, 69997945.0 / 29380423.0,
+    ],
+];
 
 pub const RECORD: Record = Record {
     name: "dopri5",
@@ -30,7 +46,7 @@ pub const RECORD: Record = Record {
     limit: 0.997_189_008_632_529_9,
     needs: Needs::Rates,
     carry: None,
-    estimate: Some(Estimate { order: 5, error, coarse: None }),
+    estimate: Some(Estimate { order: 5, error, coarse: None, extension: Some(extension) }),
     section: "not in Hoffmann (2002)",
     reference: "J. R. Dormand, P. J. Prince, A family of embedded Runge-Kutta formulae, J. Comp. Appl. Math. 6 (1980) 19",
     about: "Six evaluations and fifth order; with tolerance= a seventh, at the result, estimates its error by one of fourth \
@@ -45,4 +61,8 @@ fn step(s: Rates, t: Time, h: Length, v: Block, y: Block) -> (Block, Block) {
 
 fn error(s: Rates, t: Time, h: Length, v: Block, y: Block) -> (Block, Block) {
     combined(ERROR, &TABLEAU.stages(s, t, h, v, y))
+}
+
+fn extension(s: Rates, t: Time, h: Length, v: Block, y: Block) -> Vec<(Block, Block)> {
+    powers(EXTENSION, &TABLEAU.stages(s, t, h, v, y))
 }

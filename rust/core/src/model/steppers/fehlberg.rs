@@ -1,7 +1,7 @@
 use crate::model::{
     method::{Estimate, Needs, Record},
     program::{Block, Length, Rates, Time},
-    tableau::{Tableau, combined, plus},
+    tableau::{Tableau, combined, plus, powers},
 };
 
 pub const TABLEAU: Tableau = Tableau {
@@ -23,6 +23,14 @@ pub const ERROR: &[f64] = &[-1.0 / 360.0, 0.0, 128.0 / 4275.0, 2197.0 / 75240.0,
 /// pole.
 pub const COARSE: &[f64] =
     &[-385.0 / 10188.0, 352.0 / 849.0, -39424.0 / 48393.0, -28561.0 / 193572.0, 77.0 / 849.0, 140.0 / 283.0];
+/// The weights of the powers of θ in the state at the share θ of a step: see the reference.
+const EXTENSION: &[&[f64]] = &[
+    &[1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+    &[-91.0 / 36.0, 0.0, 896.0 / 171.0, -2197.0 / 684.0, 1.0, -2.0, 1.5],
+    &[68.0 / 27.0, 0.0, -21248.0 / 2565.0, 4394.0 / 513.0, -2.8, 4.0, -4.0],
+    &[-0.875, 0.0, 1024.0 / 285.0, -2197.0 / 456.0, 1.6, -2.0, 2.5],
+];
+const MORE: Tableau = Tableau { nodes: &[1.0], rows: &[WEIGHTS] };
 
 pub const RECORD: Record = Record {
     name: "fehlberg",
@@ -34,7 +42,7 @@ pub const RECORD: Record = Record {
     limit: 0.0,
     needs: Needs::Rates,
     carry: None,
-    estimate: Some(Estimate { order: 5, error, coarse: Some(coarse) }),
+    estimate: Some(Estimate { order: 5, error, coarse: Some(coarse), extension: Some(extension) }),
     section: "§12",
     reference: "E. Fehlberg, Low-order classical Runge-Kutta formulas with stepsize control, NASA TR R-315 (1969)",
     about: "Advances with the fourth-order result, by five evaluations; with tolerance= a sixth estimates its error by the \
@@ -53,4 +61,8 @@ fn coarse(s: Rates, t: Time, h: Length, v: Block, y: Block) -> (Block, Block) {
 
 fn error(s: Rates, t: Time, h: Length, v: Block, y: Block) -> (Block, Block) {
     combined(ERROR, &TABLEAU.stages(s, t, h, v, y))
+}
+
+fn extension(s: Rates, t: Time, h: Length, v: Block, y: Block) -> Vec<(Block, Block)> {
+    powers(EXTENSION, &MORE.stages_after(TABLEAU.stages(s, t, h, v, y), s, t, h, v, y))
 }

@@ -2,7 +2,7 @@ use crate::model::{
     method::{Estimate, Needs, Record},
     program::{Block, Length, Rates, Time},
     rosenbrock::Rosenbrock,
-    tableau::{combined, plus},
+    tableau::{combined, plus, powers},
 };
 
 const METHOD: Rosenbrock = Rosenbrock {
@@ -28,6 +28,18 @@ const METHOD: Rosenbrock = Rosenbrock {
 };
 const WEIGHTS: &[f64] = &[1.221_224_509_226_641, 6.019_134_481_288_629, 12.537_083_329_320_87, -0.687_886_036_105_895, 1.0, 1.0];
 const ERROR: &[f64] = &[0.0, 0.0, 0.0, 0.0, 0.0, 1.0];
+/// The weights of the powers of θ in the state at the share θ of a step: see the reference.
+const EXTENSION: &[&[f64]] = &[
+    &[11.347_459_592_672_5, -1.468_861_396_321_538, -22.263_835_286_236_6, -8.680_657_743_674_718, 2.025_137_723_295_662, 1.0],
+    &[
+        -10.802_515_422_725_985, 13.575_710_529_290_182, 51.231_761_824_482_25, 32.759_996_821_752_69, -7.619_526_849_012_534,
+        0.0,
+    ],
+    &[
+        0.676_280_339_280_125_3, -6.087_714_651_680_015, -16.430_843_208_924_78, -24.767_225_114_183_86, 6.594_389_125_716_872,
+        0.0,
+    ],
+];
 
 pub const RECORD: Record = Record {
     name: "rodas4",
@@ -39,7 +51,7 @@ pub const RECORD: Record = Record {
     limit: f64::INFINITY,
     needs: Needs::Rates,
     carry: None,
-    estimate: Some(Estimate { order: 4, error, coarse: None }),
+    estimate: Some(Estimate { order: 4, error, coarse: None, extension: Some(extension) }),
     section: "not in Hoffmann (2002)",
     reference: "E. Hairer, G. Wanner, Solving Ordinary Differential Equations II, second edition (1996), section IV.7",
     about: "For stiff systems: six solutions of linear equations with one matrix, I − hJ/4, and no iteration. L-stable and stiffly \
@@ -54,4 +66,8 @@ fn step(s: Rates, t: Time, h: Length, v: Block, y: Block) -> (Block, Block) {
 
 fn error(s: Rates, t: Time, h: Length, v: Block, y: Block) -> (Block, Block) {
     combined(ERROR, &METHOD.stages(s, t, h, v, y))
+}
+
+fn extension(s: Rates, t: Time, h: Length, v: Block, y: Block) -> Vec<(Block, Block)> {
+    powers(EXTENSION, &METHOD.stages(s, t, h, v, y))
 }

@@ -2,7 +2,7 @@ use crate::model::{
     method::{Estimate, Needs, Record},
     program::{Block, Length, Rates, Time},
     rosenbrock::Rosenbrock,
-    tableau::{combined, plus},
+    tableau::{combined, plus, powers},
 };
 
 const GAMMA: f64 = 0.211_937_563_194_290_14;
@@ -102,6 +102,25 @@ const WEIGHTS: &[f64] = &[
     1.0,
 ];
 const ERROR: &[f64] = &[0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0];
+/// The weights of the powers of θ in the state at the share θ of a step: see the reference.
+const EXTENSION: &[&[f64]] = &[
+    &[
+        18.445_940_457_357_736, 0.003_873_660_219_295_5, -1.193_724_251_372_219, -2.550_612_778_867_943, 0.555_146_713_329_451,
+        2.124_108_831_045_040_4, 1.427_287_619_443_187_4, 0.827_977_789_298_445_1,
+    ],
+    &[
+        -35.864_475_363_615_57, 1.588_978_025_173_108, -7.390_011_680_591_034, -22.127_299_463_947_274, 19.651_189_793_387_97,
+        14.856_554_783_201_469, -7.216_327_922_863_061, -6.538_213_859_221_817,
+    ],
+    &[
+        21.335_592_082_873_973, 3.856_958_974_025_215, 69.877_576_235_662_45, 104.620_342_912_442_23, -72.249_009_700_861_69,
+        -75.770_599_866_913_8, 6.633_213_460_592_355, 11.593_323_255_637_094,
+    ],
+    &[
+        -11.419_903_575_922_262, -2.887_964_514_613_699_4, -72.921_379_959_960_29, -80.125_118_346_226_43,
+        52.072_871_366_152_654, 59.789_936_252_667_29, 0.155_826_842_827_519_13, -4.883_087_185_713_722,
+    ],
+];
 
 pub const RECORD: Record = Record {
     name: "rodas5p",
@@ -113,7 +132,7 @@ pub const RECORD: Record = Record {
     limit: f64::INFINITY,
     needs: Needs::Rates,
     carry: None,
-    estimate: Some(Estimate { order: 5, error, coarse: None }),
+    estimate: Some(Estimate { order: 5, error, coarse: None, extension: Some(extension) }),
     section: "not in Hoffmann (2002)",
     reference: "G. Steinebach, Construction of Rosenbrock-Wanner method Rodas5P and numerical benchmarks within the Julia \
                 Differential Equations package, BIT Numerical Mathematics 63 (2023) 27",
@@ -129,4 +148,8 @@ fn step(s: Rates, t: Time, h: Length, v: Block, y: Block) -> (Block, Block) {
 
 fn error(s: Rates, t: Time, h: Length, v: Block, y: Block) -> (Block, Block) {
     combined(ERROR, &METHOD.stages(s, t, h, v, y))
+}
+
+fn extension(s: Rates, t: Time, h: Length, v: Block, y: Block) -> Vec<(Block, Block)> {
+    powers(EXTENSION, &METHOD.stages(s, t, h, v, y))
 }

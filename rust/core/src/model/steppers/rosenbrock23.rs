@@ -2,7 +2,7 @@ use crate::model::{
     method::{Estimate, Needs, Record},
     program::{Block, Length, Rates, Time},
     rosenbrock::Rosenbrock,
-    tableau::{combined, plus},
+    tableau::{combined, plus, powers},
 };
 
 /// 1/(2 + √2), the γ in (0, ½) for which the step is L-stable, and its reciprocal.
@@ -18,6 +18,9 @@ const METHOD: Rosenbrock = Rosenbrock {
 const WEIGHTS: &[f64] = &[OVER, OVER, 0.0];
 const ERROR: &[f64] = &[OVER / 6.0, 3.080_880_229_039_762, OVER / 6.0];
 
+/// The weights of the powers of θ in the state at the share θ of a step: see the reference.
+const EXTENSION: &[&[f64]] = &[&[OVER, -2.0 * GAMMA / (1.0 - 2.0 * GAMMA) * OVER], &[0.0, OVER / (1.0 - 2.0 * GAMMA)]];
+
 pub const RECORD: Record = Record {
     name: "rosenbrock23",
     title: "Rosenbrock 2(3)",
@@ -28,7 +31,7 @@ pub const RECORD: Record = Record {
     limit: f64::INFINITY,
     needs: Needs::Rates,
     carry: None,
-    estimate: Some(Estimate { order: 3, error, coarse: None }),
+    estimate: Some(Estimate { order: 3, error, coarse: None, extension: Some(extension) }),
     section: "not in Hoffmann (2002)",
     reference: "L. F. Shampine, M. W. Reichelt, The MATLAB ODE suite, SIAM Journal on Scientific Computing 18 (1997) 1",
     about: "For stiff systems: three solutions of linear equations with one matrix, I − γhJ, and no iteration. L-stable: of any step \
@@ -43,4 +46,8 @@ fn step(s: Rates, t: Time, h: Length, v: Block, y: Block) -> (Block, Block) {
 
 fn error(s: Rates, t: Time, h: Length, v: Block, y: Block) -> (Block, Block) {
     combined(ERROR, &METHOD.stages(s, t, h, v, y))
+}
+
+fn extension(s: Rates, t: Time, h: Length, v: Block, y: Block) -> Vec<(Block, Block)> {
+    powers(EXTENSION, &METHOD.stages(s, t, h, v, y))
 }

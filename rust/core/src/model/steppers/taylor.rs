@@ -16,7 +16,7 @@ pub const RECORD: Record = Record {
     limit: 3.395_140_220_574_925, // the root of 1/201600 − x/1451520 + x²/33868800 − x³/1625702400, x = Φ²
     needs: Needs::Rates,
     carry: None,
-    estimate: Some(Estimate { order: ORDER, error, coarse: None }),
+    estimate: Some(Estimate { order: ORDER, error, coarse: None, extension: None }),
     section: "not in Hoffmann (2002)",
     reference: "À. Jorba, M. Zou, A software package for the numerical integration of ODEs by means of high-order Taylor methods, \
                 Experimental Mathematics 14 (2005) 99",

@@ -1,7 +1,7 @@
 use crate::model::{
     method::{Estimate, Needs, Record},
     program::{Block, Length, Rates, Time},
-    tableau::{Tableau, combined, plus},
+    tableau::{Tableau, combined, plus, powers},
 };
 
 const TABLEAU: Tableau = Tableau {
@@ -28,6 +28,22 @@ const ERROR: &[f64] = &[
     0.45808210592918697,
     -0.015151515151515152,
 ];
+/// The weights of the powers of θ in the state at the share θ of a step: see the reference.
+const EXTENSION: &[&[f64]] = &[
+    &[1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+    &[
+        -2.763_706_197_274_826, 0.131_699_999_999_999_98, 3.930_296_236_894_751_6, -12.411_077_166_933_676,
+        37.509_313_416_511_04, -27.896_526_289_197_286, 1.5,
+    ],
+    &[
+        2.913_255_461_821_912_6, -0.2234, -5.941_033_872_131_505, 30.338_188_630_282_32, -88.178_904_894_766_4,
+        65.091_894_674_793_66, -4.0,
+    ],
+    &[
+        -1.053_088_497_729_021_6, 0.1017, 2.490_627_285_651_253, -16.548_102_889_244_902, 47.379_521_962_819_28,
+        -34.870_657_861_496_61, 2.5,
+    ],
+];
 
 pub const RECORD: Record = Record {
     name: "tsit5",
@@ -39,7 +55,7 @@ pub const RECORD: Record = Record {
     limit: 0.477_978_868_609_194, // by the numbers above as they are in double precision, which cost the tenth digit
     needs: Needs::Rates,
     carry: None,
-    estimate: Some(Estimate { order: 5, error, coarse: None }),
+    estimate: Some(Estimate { order: 5, error, coarse: None, extension: Some(extension) }),
     section: "not in Hoffmann (2002)",
     reference: "Ch. Tsitouras, Runge-Kutta pairs of order 5(4) satisfying only the first column simplifying assumption, \
             Comput. Math. Appl. 62 (2011) 770",
@@ -55,4 +71,8 @@ fn step(s: Rates, t: Time, h: Length, v: Block, y: Block) -> (Block, Block) {
 
 fn error(s: Rates, t: Time, h: Length, v: Block, y: Block) -> (Block, Block) {
     combined(ERROR, &TABLEAU.stages(s, t, h, v, y))
+}
+
+fn extension(s: Rates, t: Time, h: Length, v: Block, y: Block) -> Vec<(Block, Block)> {
+    powers(EXTENSION, &TABLEAU.stages(s, t, h, v, y))
 }

@@ -74,7 +74,7 @@ pub const RECORD: Record = Record {
     limit: 2.756_965_124_924_52,
     needs: Needs::Rates,
     carry: None,
-    estimate: Some(Estimate { order: 9, error, coarse: None }),
+    estimate: Some(Estimate { order: 9, error, coarse: None, extension: None }),
     section: "not in Hoffmann (2002)",
     reference: "J. H. Verner, Numerically optimal Runge-Kutta pairs with interpolants, Numer. Algorithms 53 (2010) 383",
     about: "Verner's most efficient pair of these orders: fifteen evaluations and ninth order, for the tightest tolerances \

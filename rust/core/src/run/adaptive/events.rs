@@ -11,7 +11,7 @@ use crate::{
         watch::{Candidates, Step, Stop, Watch},
     },
     group::AdaptiveBatch,
-    step::pace::Pace,
+    step::pace::{Pace, length},
 };
 
 /// What an event needs in the lanes.
@@ -315,11 +315,6 @@ pub(super) struct HeldEnd {
     pub t: f64,
     /// The state there, if it is another than that of a trial.
     pub state: Option<Vec<f64>>,
-}
-
-/// How long a step is that ends at the wall if it would cross it.
-pub(super) fn length(t: f64, h: f64, wall: f64) -> f64 {
-    if wall < t + h { wall - t } else { h }
 }
 
 /// Copies a row, times a sign.
