@@ -270,3 +270,27 @@ def test_backward() -> None:
 def test_solve_ivp_takes_the_same_steps() -> None:
     by_scipys_name = sw.solve_ivp(lambda t, y: np.where(t > 50, 20.0, 0.0) - y, (0.0, 51.0), [1.0], rtol=1e-8, atol=1e-12)
     assert by_scipys_name.y[0, -1] == pytest.approx(20.0 * -np.expm1(-1.0), rel=1e-6)
+
+
+def test_switches_are_looked_for_once_for_all_numbers(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What follows from the operations of a function holds for each of its systems; the times are those of its own numbers."""
+    built: list[int] = []
+    begin = switching.Switches.__init__
+
+    def counted(self: Any, *arguments: Any) -> None:
+        built.append(1)
+        begin(self, *arguments)
+
+    monkeypatch.setattr(switching.Switches, "__init__", counted)
+
+    @sw.system(order=1)
+    def charged(t: Any, y: Any, *, begin: Any = 1.0, rate: Any = 1.0) -> Any:
+        return np.where((t > begin) & (t < begin + 0.01), 100.0 * rate, 0.0)
+
+    for begin_of_pulse in (0.5, 1.0, 2.0, 3.7):
+        run = sw.integrate(charged(begin=begin_of_pulse, rate=0.3), "dop853", y=0.0, tolerance=1e-6, at=[begin_of_pulse, 4.0])
+        assert run.y == pytest.approx(np.array([0.0, 0.3]), abs=1e-9)
+        assert charged(begin=begin_of_pulse).switching_times(0.0, 4.0).reshape(-1) == pytest.approx(
+            [begin_of_pulse, begin_of_pulse + 0.01]
+        )
+    assert len(built) == 1

@@ -249,14 +249,17 @@ class OwnSystem(System):
     def _trace_once(self) -> None:
         """Trace the function, unless the cache has the operations of an equal function with parameters of the same kinds."""
         key = self._key()
-        if key is not None and (operations := _TRACED.get(key)) is not None:
+        if key is not None and (known := _TRACED.get(key)) is not None:
+            operations, equations = known
+            if equations == self.equations:  # of the same definition: what it has found of the rates holds for these, too
+                complete(self, equations=equations)
             self._take(operations)
             return
         self._trace()
         if key is not None:
             if len(_TRACED) >= MOST_TRACED:
                 _TRACED.clear()
-            _TRACED[key] = self._core
+            _TRACED[key] = self._core, self.equations
 
     def _key(self) -> Any:
         """A key of all that the operations depend on; None if a part of it may change unnoticed."""
