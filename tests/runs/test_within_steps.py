@@ -143,9 +143,29 @@ def test_a_number_that_changes_by_orders_of_magnitude_in_a_step_is_followed_by_s
         a = np.exp(-20.0 * t)
         b = (20.0 / 17.0) * (np.exp(-3.0 * t) - a)
         exact = np.stack([a, b, 1.0 - a - b], axis=1)[..., 0]
+        between = sw.integrate(cascade, method, tolerance=tolerance, at=at[-1:], y=start, every=1)(at)
+        np.testing.assert_allclose(between, run.y, rtol=20.0 * tolerance, atol=0.0)
         seen = exact > 1e-12  # the closed form of the last cancels
         assert (np.abs(run.y[..., 0] / exact - 1.0)[seen] < 100.0 * tolerance).all()
         assert (run.y >= 0.0).all()
+
+
+@sw.system(order=1)
+def gated(t: Any, y: Any, *, begin: Any = 0.4, end: Any = 0.8) -> Any:
+    """A pulse of 100, whose times cannot be told from the equations, since 0·y is added."""
+    s = t + 0.0 * y
+    return np.where((s > begin) & (s < end), 100.0, 0.0) - 2.0 * y
+
+
+def test_where_a_step_between_is_rejected_there_are_shorter_ones() -> None:
+    """As states of ``run(t)`` in steps in which a number changes much."""
+    times = np.linspace(0.0, 3.0, 301)
+    for method in ("dopri5", "tsit5", "merson", "dop853"):
+        run = sw.integrate(gated, method, y=5e-4, tolerance=1e-2, at=[3.0], every=1)
+        between = run(times)
+        inside = np.clip(times - 0.4, 0.0, 0.4)
+        exact = (5e-4 * np.exp(-2.0 * times)) - 50.0 * np.expm1(-2.0 * inside) * np.exp(-2.0 * np.maximum(times - 0.8, 0.0))
+        assert np.abs(between - exact).max() < 0.1 * exact.max()
 
 
 def test_states_that_owe_more_take_a_step_each() -> None:

@@ -126,7 +126,7 @@ def within_steps(
     count = np.arange(len(order)) - np.maximum.accumulate(np.where(new, np.arange(len(order)), 0))
     new |= count % AT_ONCE_IN_A_STEP == 0
     first, column = order[new], np.cumsum(new) - 1
-    row, others = count % AT_ONCE_IN_A_STEP, np.flatnonzero(~known & ~begins)
+    row, is_left = count % AT_ONCE_IN_A_STEP, ~known & ~begins
     shapes = plan.system.v_shape, plan.system.y_shape
     out = [np.empty((*shape, len(times))) for shape in shapes]
     for to, block in zip(out, start(np.flatnonzero(begins)), strict=True):
@@ -138,6 +138,9 @@ def within_steps(
         made = by_extension(plan_of(which), pacing_of(which), paces[:, which], since[first], ends[first], at, *start(first))
         for to, block in zip(out, made, strict=True):
             to[..., order] = np.moveaxis(block[row, ..., column], 0, -1)
+            # Where a number changes much in a step, states take steps, which may have to be shorter.
+            is_left |= known & np.isnan(to).any(axis=tuple(range(to.ndim - 1)))
+    others = np.flatnonzero(is_left)
     if len(others):
         which = member[others]
         made = by_steps(plan_of(which), pacing_of(which), paces[:, which], since[others], times[others], *start(others))
