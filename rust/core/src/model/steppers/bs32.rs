@@ -10,11 +10,8 @@ const WEIGHTS: &[f64] = &[2.0 / 9.0, 1.0 / 3.0, 4.0 / 9.0, 0.0];
 /// The third-order result less the second-order one.
 const ERROR: &[f64] = &[-5.0 / 72.0, 1.0 / 12.0, 1.0 / 9.0, -1.0 / 8.0];
 /// The weights of the powers of θ in the state at the share θ of a step: see the reference.
-const EXTENSION: &[&[f64]] = &[
-    &[1.0, 0.0, 0.0, 0.0],
-    &[-4.0 / 3.0, 1.0, 4.0 / 3.0, -1.0],
-    &[5.0 / 9.0, -2.0 / 3.0, -8.0 / 9.0, 1.0],
-];
+const EXTENSION: &[&[f64]] =
+    &[&[1.0, 0.0, 0.0, 0.0], &[-4.0 / 3.0, 1.0, 4.0 / 3.0, -1.0], &[5.0 / 9.0, -2.0 / 3.0, -8.0 / 9.0, 1.0]];
 
 pub const RECORD: Record = Record {
     name: "bs32",

@@ -17,7 +17,8 @@ const EXTENSION: &[&[f64]] = &[
     &[17.0 / 3.0, 0.0, 0.0, 16.0 / 3.0, 53.0 / 12.0, -5.0, -125.0 / 12.0],
     &[-2.5, 0.0, 0.0, -10.0 / 3.0, -2.375, 3.0, 125.0 / 24.0],
 ];
-const MORE: Tableau = Tableau { nodes: &[1.0, 0.2], rows: &[WEIGHTS, &[109.0 / 750.0, 0.0, 0.0, 26.0 / 375.0, 13.0 / 750.0, -0.032]] };
+const MORE: Tableau =
+    Tableau { nodes: &[1.0, 0.2], rows: &[WEIGHTS, &[109.0 / 750.0, 0.0, 0.0, 26.0 / 375.0, 13.0 / 750.0, -0.032]] };
 
 pub const RECORD: Record = Record {
     name: "merson",

@@ -103,6 +103,7 @@ const WEIGHTS: &[f64] = &[
 ];
 const ERROR: &[f64] = &[0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0];
 /// The weights of the powers of θ in the state at the share θ of a step: see the reference.
+#[rustfmt::skip]
 const EXTENSION: &[&[f64]] = &[
     &[
         18.445_940_457_357_736, 0.003_873_660_219_295_5, -1.193_724_251_372_219, -2.550_612_778_867_943, 0.555_146_713_329_451,
