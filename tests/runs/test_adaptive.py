@@ -530,13 +530,16 @@ def test_random_pulses() -> None:
 def test_a_state_within_a_step_sees_what_its_step_sees() -> None:
     """The pulse lies within the first step, which is long: its stages see nothing of it, and so no state but the last.
 
-    That is made by a step of its own, whose stages do; where it is found out, the steps from there on are short.
+    That is made by a step of its own, whose stages do; where it is found out, the steps from there on are short, and the other
+    states are theirs: the step to the last time comes before them.
     """
     for method in PAIRS:
         ask: dict[str, Any] = {"y": 0.0, "dt": 1.0, "tolerance": 1e-9}
         run = sw.integrate(gated(begin=0.31, end=0.33), method, at=[0.329], **ask)
         assert run.y == pytest.approx(opened(run.t, 0.31, 0.33), abs=1e-6), method
         assert run.paces.rejected > 0, method
+        run = sw.integrate(gated(begin=0.31, end=0.33), method, at=[0.1, 0.315, 0.32, 0.329], **ask)
+        assert run.y == pytest.approx(opened(run.t, 0.31, 0.33), abs=1e-6), method
         run = sw.integrate(gated(begin=0.31, end=0.33), method, at=[0.329, 0.7], **ask)
         assert run.y[0] == 0.0, method
         run = sw.integrate(gated(begin=0.31, end=0.33), method, at=[0.329, 0.7], max_step=0.01, **ask)

@@ -32,7 +32,7 @@ PACE = (
     "before", "most", "accepted", "rejected", "extra_steps", "error", "work",
 )  # fmt: skip
 #: What else a member is between launches: whole numbers, and numbers.
-MARKS = ("next", "kept", "passed", "held_before", "has_origin", "status")
+MARKS = ("next", "kept", "passed", "held_before", "has_origin", "is_known", "status")
 SEEN = ("seen_accepted", "origin_rejected")
 #: The status of a member that is not at its end.
 RUNNING = -2
@@ -72,7 +72,7 @@ def adapt(machine: Machine, model: Any, plan: Any, pacing: Any, arrays: Any) -> 
     """Make the run: as ``_core.adapt``. False if nothing was done, since the start is to be found by others."""
     promise.check(machine, single=plan.single)
     members = arrays.status.size
-    stages, text = text_of(model, plan, len(arrays.paces), pacing.extends + (pacing.extends and pacing.is_part))
+    stages, text = text_of(model, plan, len(arrays.paces), extends=pacing.extends, is_part=pacing.is_part)
     if pacing.begins and "begin" not in stages.texts:
         return False
     if members == 0:
@@ -83,17 +83,18 @@ def adapt(machine: Machine, model: Any, plan: Any, pacing: Any, arrays: Any) -> 
     return True
 
 
-def text_of(model: Any, plan: Any, numbers: int, extends: int = 0) -> tuple[Stages, str]:
+def text_of(model: Any, plan: Any, numbers: int, *, extends: bool = False, is_part: bool = False) -> tuple[Stages, str]:
     """The stages of a model, and the kernels of a run of adaptive steps; a pace has so many numbers, with those of groups.
 
-    ``extends`` is 1 if states before the last time are those of the continuous extension of the method, 2 if the last is, too.
+    ``extends`` is whether states before the last time are those of the continuous extension of the method; the last is, too,
+    where the run ``is_part`` of another.
     """
     observer = plan.observer
-    kind = plan.single, plan.backward, numbers, None if observer is None else observer.key, extends
+    kind = plan.single, plan.backward, numbers, None if observer is None else observer.key, extends, is_part
     key = _core.tape_number(model, attempts=True), kind
     if key not in _TEXTS:
-        stages = Stages(model, single=plan.single, attempts=True, extends=extends > 0)
-        _TEXTS[key] = stages, _Kernels(stages, numbers, len(model.tables), plan.backward, observer, until_last=extends < 2).text()
+        stages = Stages(model, single=plan.single, attempts=True, extends=extends)
+        _TEXTS[key] = stages, _Kernels(stages, numbers, len(model.tables), plan.backward, observer, until_last=not is_part).text()
         while len(_TEXTS) > MOST_TEXTS:
             _TEXTS.popitem(last=False)
     return _TEXTS[key]
@@ -137,7 +138,7 @@ class _Run:
         arrays, times = self.arrays, self.times
         room = 0 if arrays.steps is None else len(arrays.steps.t)
         waypoints = 0 if arrays.waypoints is None else WAYPOINTS * arrays.waypoints.shape[1]
-        each = 8 * (times * self.state + room * (1 + self.state) + waypoints + self.rows + self.state)
+        each = 8 * (times * self.state + room * (1 + self.state) + waypoints + self.rows + 2 * self.state)
         at_once = max(1, min(MOST_SAVED, self.machine.largest) // each)
         for first in range(0, self.members, at_once):
             self.share(Share(first, min(self.members, first + at_once)))
@@ -166,7 +167,7 @@ class _Run:
         of_call = (np.int64(share.first), np.int64(width), *jumps, rows, seen, marks)
         self.call("begin", width, group, *self.numbers.arguments, *of_call, np.int32(pacing.begins))
         times = len(pacing.at)
-        origin, count = machine.room(8 * self.state * width), machine.put(np.zeros(1, np.int32))
+        origin, count = machine.room(16 * self.state * width), machine.put(np.zeros(1, np.int32))
         saved = [machine.room(8 * self.times * n * width) for n in (self.n_v, self.n_y)]
         steps, room = [self.nothing] * 3, 0
         if arrays.steps is not None:
@@ -293,7 +294,7 @@ class _Kernels:
             "if (c >= width) return;",
             "const long g = first_member + c; (void)g;",
             *self.load(),
-            "next = kept = has_origin = 0;",
+            "next = kept = has_origin = is_known = 0;",
             f"status = {RUNNING};",
             f"seen_accepted = {of['accepted']};",
             "origin_rejected = 0.0;",
@@ -411,18 +412,27 @@ class _Kernels:
         ]
 
     def extension(self) -> list[str]:
-        """Statements that save the states at the times within a held step that come before the last one."""
+        """Statements that save the states at the times within a held step that come before the last one.
+
+        If that is within, the step to there comes first: it may show that the held one missed something. Its state then stands
+        behind the origin until the others are saved.
+        """
         of, n, text = self.of, self.state, self.texts["extension"]
-        t, h, wall, target = (of[name] for name in ("t", "h", "wall", "target"))
+        t, h, wall, target, extra = (of[name] for name in ("t", "h", "wall", "target", "extra"))
         *terms, span, changes = text.results[n + self.numbers :]
         order = len(terms) // max(n, 1)
         lines = [
             f"const double final = {'time_of(at, at_width, times - 1, g)' if self.until_last else 'INFINITY'};",
+            "int comes_first = 0;",
             f"if ({self.holds()} && {target} < final) {{",
             *text.body,
             *(f"const real power{i} = {term};" for i, term in enumerate(terms)),
             f"const double reach = {wall} < {t} + {h} ? {wall} : {t} + {h}, per_step = 1.0 / {span};",
-            f"while (!({changes} > 0.0) && {target} < reach && {target} < final) {{",
+            f"comes_first = !({changes} > 0.0) && final < reach && !is_known;",
+            f"if (comes_first) {{ {extra} = final - {t}; has_origin = 2; origin_rejected = {of['rejected']};",
+            *(f"origin[{i} * width + c] = s{i};" for i in range(n)),
+            "}",
+            f"while (!comes_first && !({changes} > 0.0) && {target} < reach && {target} < final) {{",
             f"const double share = ({target} - {t}) * per_step, square = share * share;",
         ]
         for i in range(n):
@@ -430,7 +440,9 @@ class _Kernels:
             lines.append(f"const real within{i} = s{i} + share * ({odd} + share * ({even}));")
         saved = ["{", *(f"const real s{i} = within{i};" for i in range(n)), *self.save_next(), "}"]
         following = ["if (next == times) break;", f"{target} = time_of(at, at_width, next, g);"]
-        return [*lines, *saved, *following, "}", "}"]
+        last = ["{", *(f"const real s{i} = origin[{n + i} * width + c];" for i in range(n)), *self.save_next(), "}"]
+        known = ["if (is_known) {", "is_known = 0;", *last, f"if (next < times) {target} = time_of(at, at_width, next, g);", "}"]
+        return [*lines, *saved, *following, "}", "}", *known]
 
     @staticmethod
     def horner(terms: list[str]) -> str:
@@ -525,11 +537,16 @@ class _Kernels:
             "is_full = kept == room;",
             "}",
             "if (has_origin) {",
-            "has_origin = 0;",
             f"if ({rejected} <= origin_rejected) {{",
+            "if (has_origin == 1) {",
             *self.save_next(),
+            "} else {",
+            "is_known = 1;",
+            *(f"origin[{n + i} * width + c] = {self.row}{i};" for i in range(n)),
+            "}",
             *(f"{self.row}{i} = origin[{i} * width + c];" for i in range(n)),
             "}",
+            "has_origin = 0;",
             "}",
             *self.cross(),
             "while (next < times) {",
@@ -541,9 +558,9 @@ class _Kernels:
             *terms,
             "if (goes_on) {",
             *(self.extension() if "extension" in texts else []),
-            "if (next < times) {",
+            f"if ({'!comes_first && ' if 'extension' in texts else ''}next < times) {{",
             *goes,
-            "}",
+            "} else ends = next == times;",
             "}",
             "if (ends) {",
             f"const int is_out = {accepted} + {rejected} >= budget, is_finite = {of['error']} < INFINITY;",

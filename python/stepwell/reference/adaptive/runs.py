@@ -137,7 +137,8 @@ def run(
     ``attempt(pace, budget, v, y)`` is one attempt of all members. Every ``every``-th accepted step is recorded, or none if
     it is 0. ``waypoints`` gets the last waypoints of each member (``waypoints.keep``).
     """
-    one = np.ones(pace.t.shape)
+    one, known = np.ones(pace.t.shape), np.zeros(pace.t.shape, dtype=bool)
+    at_last: tuple[Array, ...] = v, y
     saved_v, saved_y, steps = [], [], []
     if jumps is not None:
         pace = pace._replace(wall=jumps.wall(pace.t))
@@ -158,9 +159,19 @@ def run(
                     if jumps is not None:
                         pace = jumps.crossed(pace, series=series)
                 waits = (pace.held > 0.0) & ~there
+                if np.any(ended := waits & is_last & known):
+                    at_target = tuple(where(ended, new, old) for new, old in zip(at_last, at_target, strict=True))
+                    there, waits, known = there | ended, waits & ~ended, known & ~ended
                 if extension is not None and np.any(waits & ~is_last):
                     *states, holds_good = extension(pace, v, y, target)
                     within_step = waits & ~is_last & holds_good
+                    # If the last time is within, the step to there comes first: it may show that the held one missed something.
+                    ends = within_step & (at[-1] < pace.reach()[0]) & ~known & (not is_part)
+                    if ends.any():
+                        pace, *made = attempt(pace._replace(extra=where(ends, at[-1] - pace.t, 0.0)), budget, v, y)
+                        at_last = tuple(where(ends, new, old) for new, old in zip(made, at_last, strict=True))
+                        known |= ends & (pace.held > 0.0)
+                        within_step, waits = within_step & (pace.held > 0.0), waits & (pace.held > 0.0)
                     at_target = tuple(where(within_step, new, old) for new, old in zip(states, at_target, strict=True))
                     there, waits = there | within_step, waits & ~within_step
                 extra = pace._replace(extra=where(waits, target - pace.t, 0.0))

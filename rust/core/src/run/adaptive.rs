@@ -462,9 +462,17 @@ impl<'a> Worker<'a> {
             if let Some((origin, rejected)) = assigned.origin.take() {
                 // An extra step whose error was not tolerated did not change the state; the run has gone on with shorter steps.
                 if self.group.pace(lane).rejected <= rejected {
-                    self.save(part, lane, &assigned);
-                    assigned.next += 1;
+                    let state = self.group.state(lane);
                     self.group.set_state(lane, &origin);
+                    let member = part.first + assigned.member;
+                    let (next, last) = (plan.at.get(assigned.next).map(|row| row.at(member)), self.last(member));
+                    if self.group.has_sums() && !assigned.by_steps && next.is_some_and(|next| next < last) {
+                        // Those before the last time, now that a step to there has seen nothing that the held one missed.
+                        self.group.keep_starts();
+                        self.save_sums(part, lane, &mut assigned, last);
+                    }
+                    self.write(part, &assigned, &state);
+                    assigned.next += 1;
                 } else {
                     assigned.by_steps = false;
                     let member = part.first + assigned.member;
@@ -500,14 +508,14 @@ impl<'a> Worker<'a> {
                     if is_within && !assigned.by_steps {
                         self.group.keep_starts();
                         assigned.by_steps = self.group.changes_within(lane);
-                        if !assigned.by_steps {
-                            // No more than these times come before the last, to which a step is made.
-                            self.save_sums(part, lane, &mut assigned, pace.reach().0.min(before));
+                        // If the last time is within, the step to there comes first.
+                        if !assigned.by_steps && pace.reach().0 <= before {
+                            self.save_sums(part, lane, &mut assigned, pace.reach().0);
                             if assigned.next == plan.at.len() {
                                 continue;
                             }
-                            is_within = false;
                         }
+                        is_within = assigned.by_steps;
                     }
                     assigned.by_steps &= is_within || pace.held <= 0.0;
                     if !assigned.by_steps {
@@ -598,7 +606,7 @@ impl<'a> Worker<'a> {
         let (t, rejected, is_held) = (at(t), at(rejected), at(held) > 0.0);
         let is_next = assigned.origin.as_ref().map_or(at(until) == target, |(_, before)| rejected <= *before);
         let holds = target < (t + at(h)).min(at(wall));
-        let is_within = self.group.has_sums() && next + usize::from(!self.plan.is_part) < self.plan.at.len();
+        let is_within = self.group.has_sums() && assigned.next + usize::from(!self.plan.is_part) < self.plan.at.len();
         let is_other = assigned.stop.is_some() || self.plan.every > 0 || self.group.has_terms() || is_within;
         if !is_next || !is_held || is_other || self.group.row_mut(until).is_none() {
             return false;
