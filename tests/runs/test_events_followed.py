@@ -83,16 +83,21 @@ ADAPTIVE_WAYS: dict[str, dict[str, Any]] = {
 }
 
 
-def drawn(number: int, backend: str, way: str | None = None, known: bool = False, carrying: str | None = None) -> sw.Run:
+def drawn(
+    number: int, backend: str, way: str | None = None, known: bool = False, carrying: str | None = None, held: bool = False, **more: Any
+) -> sw.Run:
     """A run with one to three of these events, from starts with one decimal place, some of them at an event."""
-    system, method, options = drawn_options(number, way, known, carrying)
-    return sw.integrate(system, method, backend=backend, **options)
+    system, method, options = drawn_options(number, way, known, carrying, held=held)
+    return sw.integrate(system, method, backend=backend, **options, **more)
 
 
 def drawn_options(
-    number: int, way: str | None, known: bool, carrying: str | None, members: int | None = None
+    number: int, way: str | None, known: bool, carrying: str | None, members: int | None = None, held: bool = False
 ) -> tuple[sw.System, str, dict[str, Any]]:
-    """Its arguments: with events at known times, if ``known``; ``carrying`` is a method that carries something else than v."""
+    """Its arguments: with events at known times, if ``known``; ``carrying`` is a method that carries something else than v.
+
+    The drive of a place is an input of samples, the same for all or one of each member, if they are ``held``.
+    """
     random = np.random.default_rng([13, number])
     pool = (OF_COORDINATES, OF_A_PLACE)[number % 2]
     events = [pool[name]() for name in random.choice(list(pool), size=random.integers(1, 4), replace=False)]
@@ -107,25 +112,30 @@ def drawn_options(
     w = float(random.choice([0.5, 3.0]))
     if number % 2:
         options |= {"v": np.round(random.normal(size=n), 1), "y": np.round(random.normal(size=n), 1) * (random.random() > 0.2)}
-        system = (driven if carrying is None else undamped)(
-            k=float(random.choice([0.0, 1.0, 4.0])), f=random.choice([0.0, 0.5, 2.0], size=n), w=w
-        )
+        k, f = float(random.choice([0.0, 1.0, 4.0])), random.choice([0.0, 0.5, 2.0], size=n)
+        if held:
+            samples = np.round(np.random.default_rng([16, number]).normal(size=(9, n) if number % 4 == 1 else 9), 1)
+            f = sw.Sampled(samples, interval=(0.1, 0.37)[number // 4 % 2], start=(0.0, -0.2)[number // 8 % 2])
+        system = (driven if carrying is None else undamped)(k=k, f=f, w=w)
     else:
         options |= {"y": np.round(random.normal(size=(2, n)), 1)}
         system = linear(a=np.round(random.normal(size=(2, 2)), 1), b=np.round(random.normal(size=2), 1), w=w)
-    method = str(random.choice(METHODS if way is None else ADAPTIVE))
+    of_samples = ADAPTIVE[:-1] if held else ADAPTIVE  # a series has none
+    method = str(random.choice(METHODS if way is None else of_samples))
     if way is not None:
         states = {name: options[name] for name in ("v", "y") if name in options}
         options = {**states, "tolerance": 1e-5, **ADAPTIVE_WAYS[way]}
     return system, carrying or method, options | {"events": events}
 
 
-def check_the_core_follows_as_the_reference_does(numbers: range, way: str | None = None, known: bool = False) -> None:
+def check_the_core_follows_as_the_reference_does(
+    numbers: range, way: str | None = None, known: bool = False, **more: Any
+) -> None:
     occurred, rested = 0, 0
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         for number in (each for each in numbers if each not in CHATTERING):
-            run, reference = (drawn(number, backend, way, known) for backend in ("rust", "numpy"))
+            run, reference = (drawn(number, backend, way, known, **more) for backend in ("rust", "numpy"))
             assert_same_run(run, reference)
             assert [str(each) for each in run.findings] == [str(each) for each in reference.findings], number
             occurred += sum(int(each.count.sum()) for each in run.events.values())
@@ -144,6 +154,13 @@ def test_with_known_times_too(way: str | None) -> None:
     check_the_core_follows_as_the_reference_does(
         range(100, 132 if way is None else 110) if way != "jumps" else range(140, 150), way, known=True
     )
+
+
+@pytest.mark.parametrize("way", [None, "three times", "many times", "back", "jumps"])
+@pytest.mark.parametrize("more", [{"fused": True}, {"held": True}, {"held": True, "fused": True}], ids=str)
+def test_fused_steps_and_sampled_inputs_too(more: dict[str, Any], way: str | None) -> None:
+    numbers = range(201, 233 if way is None else 209, 2 if "held" in more else 1)
+    check_the_core_follows_as_the_reference_does(numbers, way, **more)
 
 
 @pytest.mark.parametrize("method", CARRYING)

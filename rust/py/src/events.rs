@@ -15,7 +15,7 @@ use stepwell_core::{
 };
 
 use crate::{
-    model::{argument_error, core_error},
+    model::{Tables, argument_error, core_error, tables},
     tape::Evaluation,
 };
 
@@ -24,6 +24,7 @@ use crate::{
 struct ValuesOf<'py> {
     of: Bound<'py, Evaluation>,
     parameters: Vec<PyReadonlyArray1<'py, f64>>,
+    tables: Tables<'py>,
 }
 
 /// Known times: see `TimesOfCore` there.
@@ -61,6 +62,7 @@ struct EventOf<'py> {
 pub(crate) struct EventsOf<'py> {
     events: Vec<EventOf<'py>>,
     step: ValuesOf<'py>,
+    repeats: bool,
     rates: ValuesOf<'py>,
     numbers: usize,
     groups: usize,
@@ -82,7 +84,7 @@ fn row<'a>(numbers: &'a PyReadonlyArray1<'_, f64>, members: usize) -> PyResult<R
 impl ValuesOf<'_> {
     fn of_core(&self, members: usize) -> PyResult<motion::Values<'_>> {
         let parameters = self.parameters.iter().map(|numbers| row(numbers, members)).collect::<PyResult<_>>()?;
-        Ok(motion::Values { of: self.of.get().0.clone(), parameters })
+        Ok(motion::Values { of: self.of.get().0.clone(), parameters, tables: tables(&self.tables)? })
     }
 }
 
@@ -108,6 +110,7 @@ impl EventsOf<'_> {
         Ok(Events {
             events,
             step: self.step.of_core(members)?,
+            repeats: self.repeats,
             rates: self.rates.of_core(members)?,
             numbers: self.numbers,
             groups: self.groups,

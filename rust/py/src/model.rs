@@ -154,6 +154,11 @@ pub(crate) type Rows<'py> = Vec<PyReadonlyArray2<'py, f64>>;
 /// The tables, borrowed for a run: start, interval, samples.
 pub(crate) type Tables<'py> = Vec<(f64, f64, PyReadonlyArray2<'py, f64>)>;
 
+/// The tables as the core takes them.
+pub(crate) fn tables<'a>(of: &'a Tables<'_>) -> PyResult<Vec<Table<'a>>> {
+    of.iter().map(|(start, interval, t)| Ok(Table { samples: by_row(t)?, start: *start, interval: *interval })).collect()
+}
+
 /// The rows of an array, each of one number or one for each member.
 pub(crate) fn by_row<'a>(array: &'a PyReadonlyArray2<'_, f64>) -> PyResult<Vec<Row<'a>>> {
     let mut rows = Vec::new();
@@ -293,10 +298,7 @@ impl ModelSpec {
         let spec = Spec {
             signature: self.signature.clone(),
             rows: all,
-            tables: tables
-                .iter()
-                .map(|(start, interval, t)| Ok(Table { samples: by_row(t)?, start: *start, interval: *interval }))
-                .collect::<PyResult<_>>()?,
+            tables: self::tables(tables)?,
         };
         let Self { signature, record, fused, precision, .. } = self;
         // The matrix form says itself which products are fused, whatever they are made of.

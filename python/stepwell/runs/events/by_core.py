@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from math import prod
 from typing import Any, NamedTuple
 
@@ -18,10 +19,14 @@ from .traced import NewState
 
 
 class Values(NamedTuple):
-    """Values of a tape, and the parameters that it reads: each one number for all members, or one for each."""
+    """Values of a tape, the parameters that it reads, each one number for all members or one for each, and its sampled inputs.
+
+    Of these the start, the interval, and a row for each sample.
+    """
 
     of: _core.Evaluation
     parameters: list[Array]
+    tables: list[tuple[float, float, Array]]
 
 
 class TimesOfCore(NamedTuple):
@@ -59,6 +64,7 @@ class Sought(NamedTuple):
     Attributes:
         events: the events.
         step: a step, of a time, a length and a state.
+        repeats: whether the steps of the run are such steps, to the last bit.
         rates: by how much a state changes in a step, likewise.
         numbers: how many numbers a state has.
         groups: of how many groups of them adaptive steps know the largest size.
@@ -70,6 +76,7 @@ class Sought(NamedTuple):
 
     events: list[OfCore]
     step: Values
+    repeats: bool
     rates: Values
     numbers: int
     groups: int
@@ -85,10 +92,10 @@ def sought(search: Collected, new_states: dict[int, NewState] | None = None, jum
     ``new_states`` are those that events give members, by the numbers of these; ``jumps`` are those of adaptive steps.
     """
     plan = search.plan
-    is_plain = bool(search.events) and plan.backend == "rust" and plan.device is None and not (plan.single or plan.fused)
+    is_plain = bool(search.events) and plan.backend == "rust" and plan.device is None and not plan.single
     if not is_plain or plan.system.controller is not None or plan.system.mass_matrix is not None:
         return None
-    step, rates = search.trials.traced_step(), search.trials.traced_rates()
+    step, rates = search.trials.of_core("step"), search.trials.of_core("rates")
     if step is None or rates is None:
         return None
     events = []
@@ -109,7 +116,8 @@ def sought(search: Collected, new_states: dict[int, NewState] | None = None, jum
         if of_value is None or (then is not None and of_then is None):
             return None
         events.append(OfCore(times, of_value, of_slope, of_then, float(event.direction), int(event.terminal), event.most))
-    both = [_values(*each) for each in (step, rates)]
+    tables = engine.model(plan).tables if search.trials.has_samples else []
+    both = [_values(*each, tables) for each in (step, rates)]
     if both[0] is None or both[1] is None:
         return None
     begin = np.ascontiguousarray(np.broadcast_to(plan.t0, plan.batch).reshape(-1) if np.ndim(plan.t0) else [plan.t0], np.float64)
@@ -118,12 +126,13 @@ def sought(search: Collected, new_states: dict[int, NewState] | None = None, jum
         rows = jumps.reshape(len(jumps), -1)
         known = TimesOfCore(*2 * [np.concatenate([rows, np.full((1, rows.shape[1]), np.inf)])])
     n = prod(plan.system.v_shape) + prod(plan.system.y_shape)
-    return Sought(events, both[0], both[1], n, engine.groups_of(plan), begin, search.sign, search.way, known)
+    return Sought(events, both[0], not plan.fused, both[1], n, engine.groups_of(plan), begin, search.sign, search.way, known)
 
 
-def _values(evaluated: Evaluated, numbers: list[Array]) -> Values | None:
-    of = evaluated.evaluation
-    return None if of is None else Values(of, [np.ascontiguousarray(each, dtype=np.float64).reshape(-1) for each in numbers])
+def _values(evaluated: Evaluated, numbers: list[Array], tables: Sequence[Any] = ()) -> Values | None:
+    if (of := evaluated.evaluation) is None:
+        return None
+    return Values(of, [np.ascontiguousarray(each, dtype=np.float64).reshape(-1) for each in numbers], list(tables))
 
 
 def made(search: Collected, sought: Sought, model: _core.ModelSpec, plan: engine.Plan, arrays: engine.Arrays) -> bool:

@@ -112,7 +112,7 @@ class _Driver(Collected):
     def _by_core(self, sought: by_core.Sought, v: Array, y: Array, bad: Whole, carried: bool) -> engine.Outcome:
         """The run by the core, which looks for the events itself."""
         plan, batch = self.plan._replace(record=()), self.plan.batch
-        if not plan.begins:
+        if sought.repeats and not plan.begins:
             noticing = watched(self.quantities, self.members.plan(np.arange(min(2, plan.members))))
             plan = plan._replace(watched=None if noticing.quantities.reads_time else noticing)
         v, y = v.reshape((*v.shape[:-1], *batch)), y.reshape((*y.shape[:-1], *batch))

@@ -68,12 +68,14 @@ class Trials:
         self._plans: dict[int, engine.Plan] = {}
         self._rates: tuple[Evaluated, list[Array]] | None = None
         self._rates_traced = False
+        #: Whether what is traced depends on samples. These are looked up by the core, where it locates events by itself.
+        self.has_samples = False
 
     def step(self, index: Any, t: Array, h: Array, v: Array, y: Array) -> tuple[Array, Array]:
         """A step of these members from v and y, with a time and a length for each."""
         if self._plan.single:
             return self._in_single(index, t, h, v, y)
-        if (traced := self.traced_step()) is None:
+        if (traced := self._traced_step()) is None or self.has_samples:
             if self._steps_one and len(index) <= MEMBERS_BY_CORE:
                 return self._one_by_one(index, t, h, v, y)
             return self._one(self._members.plan(index), t, h, v, y)
@@ -83,8 +85,11 @@ class Trials:
         n = len(rows) - y[..., 0].size
         return _block(rows[:n], v), _block(rows[n:], y)
 
-    def traced_step(self) -> tuple[Evaluated, list[Array]] | None:
-        """A step as operations, with the values of their parameters, if it is traced."""
+    def of_core(self, what: str) -> tuple[Evaluated, list[Array]] | None:
+        """A "step" or the "rates" as operations, with the values of their parameters, if they are traced."""
+        return self._traced_step() if what == "step" else self._traced_rates()
+
+    def _traced_step(self) -> tuple[Evaluated, list[Array]] | None:
         if not self._is_traced:
             self._step, self._is_traced = self._traced("step", self._on), True
         return self._step
@@ -118,7 +123,7 @@ class Trials:
         if self._plan.system.mass_matrix is not None:
             plan, sign = self._members.plan(index), -1.0 if self._plan.backward else 1.0
             return v, sign * h * registry.task("algebraic_rates")(plan.system, y, sign * t, h)  # v has no numbers
-        if (traced := self.traced_rates()) is None:
+        if (traced := self._traced_rates()) is None or self.has_samples:
             s = self._scaled(self._members.plan(index), h)
             with np.errstate(all="ignore"):
                 dv, dy = s.dv(t, v, y), s.dy(t, v, y)
@@ -129,8 +134,7 @@ class Trials:
         n = len(changes) - y[..., 0].size
         return _block(changes[:n], v), _block(changes[n:], y)
 
-    def traced_rates(self) -> tuple[Evaluated, list[Array]] | None:
-        """The rates as operations, if they are few enough and have no samples."""
+    def _traced_rates(self) -> tuple[Evaluated, list[Array]] | None:
         if not self._rates_traced:
             self._rates, self._rates_traced = self._trace_rates(), True
         return self._rates
@@ -163,7 +167,8 @@ class Trials:
         t, h = next(leaves), next(leaves)
         v, y = (_symbols(shape, leaves) for shape in (plan.system.v_shape, plan.system.y_shape))
         values = tracer.flat(*blocks(tracer, plan, t, h, v, y))
-        if tracer.tables:
+        self.has_samples = bool(tracer.tables)
+        if self.has_samples and not self._by_core:
             return None
         evaluated = Evaluated(tracer.tape, values, 2 + v.size + y.size, by_core=self._by_core)
         if not (self._by_core or self._always_traced or evaluated.operations <= MOST_OPERATIONS):
@@ -197,6 +202,7 @@ class Trials:
         """The values of the parameters of what was traced before."""
         tracer = self._tracer()
         self._scaled_symbols(tracer, tracer.tape.state(1))
+        self.has_samples = bool(tracer.tables)
         return [np.atleast_1d(each) for each in tracer.numbers]
 
     def _scaled(self, plan: engine.Plan, h: Any) -> Any:
@@ -229,7 +235,7 @@ class Trials:
     def _on(self, tracer: Tracer, plan: engine.Plan, t: Any, h: Any, v: Any, y: Any) -> tuple[Any, Any]:
         """A step with symbols."""
         s = tracer.scaled(h)
-        return (v, y) if tracer.tables else stepped(plan, s, t, h, v, y)
+        return (v, y) if tracer.tables and not self._by_core else stepped(plan, s, t, h, v, y)
 
 
 class AdaptiveTrials(Trials):

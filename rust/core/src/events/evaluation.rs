@@ -2,12 +2,14 @@
 
 use std::sync::{Arc, LazyLock};
 
+use smallvec::SmallVec;
+
 use crate::{
     aligned::Aligned,
     error::Error,
     isa::Level,
     kernel::{Tile, runner::KernelKind},
-    model::spec::Row,
+    model::spec::{Row, Table},
     stage::{CompiledStage, Stage},
     step::cache::Cache,
     tape::{
@@ -21,18 +23,43 @@ use crate::{
 pub struct Evaluation {
     stage: Arc<Stage>,
     states: usize,
+    /// How many parameters there are; behind their rows stand those of samples.
+    parameters: usize,
+    samples: Option<Arc<Samples>>,
+}
+
+/// The samples that values depend on.
+struct Samples {
+    /// The times at which they are looked up, as values of the same numbers.
+    times: Evaluation,
+    /// The number of the table of each.
+    tables: Vec<u32>,
 }
 
 impl Evaluation {
-    /// Of values that depend on `states` numbers of the state and on parameters; none if they depend on a step, a time or an input.
+    /// Of values that depend on `states` numbers of the state, on parameters and on samples; none if they depend on a step or a time.
     pub fn new(tape: &Tape, values: &[Id], states: usize) -> Result<Option<Evaluation>, Error> {
         static CACHE: LazyLock<Cache<Body, Stage>> = LazyLock::new(Cache::default);
-        let body = Body::of_values(tape, values, states as u32);
-        if body.ops.iter().any(|op| matches!(op, Op::Step | Op::Time | Op::Sample(..))) {
+        let number = |op: &Op| if let Op::Param(i) = op { *i as usize + 1 } else { 0 };
+        let parameters = tape.ops().iter().map(number).max().unwrap_or(0);
+        let (body, looked_up) = Body::of_values(tape, values, states as u32, parameters as u32);
+        if body.ops.iter().any(|op| matches!(op, Op::Step | Op::Time)) {
             return Ok(None);
         }
+        let samples = if looked_up.is_empty() {
+            None
+        } else {
+            let (tables, times): (Vec<_>, Vec<_>) = looked_up.into_iter().unzip();
+            let Some(times) = Evaluation::new(tape, &times, states)? else { return Ok(None) };
+            Some(Arc::new(Samples { times, tables }))
+        };
         let make = || Ok((Stage::new(Split { body: body.clone(), ..Split::default() }), body.ops.len()));
-        Ok(Some(Evaluation { stage: CACHE.find(&body, make)?, states }))
+        Ok(Some(Evaluation { stage: CACHE.find(&body, make)?, states, parameters, samples }))
+    }
+
+    /// Whether they depend on samples: then [`Evaluator`] alone computes them.
+    pub fn has_samples(&self) -> bool {
+        self.samples.is_some()
     }
 
     /// How many values there are.
@@ -129,9 +156,12 @@ impl Filled {
 pub(crate) struct Evaluator<'a> {
     evaluation: &'a Evaluation,
     parameters: &'a [Row<'a>],
+    tables: &'a [Table<'a>],
     level: Level,
     /// For one or two members, and for many.
     tiles: [Option<Filled>; 2],
+    /// The times of samples.
+    times: Option<Box<Evaluator<'a>>>,
 }
 
 /// Fewer members are computed one by one.
@@ -157,13 +187,23 @@ fn tile_of<'t>(
 }
 
 impl<'a> Evaluator<'a> {
-    pub(crate) fn new(evaluation: &'a Evaluation, parameters: &'a [Row<'a>], level: Level) -> Self {
-        Evaluator { evaluation, parameters, level, tiles: [None, None] }
+    pub(crate) fn new(evaluation: &'a Evaluation, parameters: &'a [Row<'a>], tables: &'a [Table<'a>], level: Level) -> Self {
+        let parameters = &parameters[..evaluation.parameters.min(parameters.len())];
+        let times = evaluation.samples.as_ref().map(|samples| Box::new(Evaluator::new(&samples.times, parameters, tables, level)));
+        Evaluator { evaluation, parameters, tables, level, tiles: [None, None], times }
+    }
+
+    /// The samples of a member that hold at these times.
+    fn samples(&self, member: usize, times: &[f64]) -> impl Iterator<Item = f64> {
+        let numbers = self.evaluation.samples.iter().flat_map(|samples| &samples.tables);
+        numbers.zip(times).map(move |(table, t)| self.tables.get(*table as usize).map_or(f64::NAN, |table| table.at(*t, member)))
     }
 
     /// The values of one member from its numbers of the state, those of some blocks one after the other.
     pub(crate) fn one(&mut self, member: usize, state: &[&[f64]]) -> &[f64] {
         let (n, results, read) = (self.evaluation.states, self.evaluation.values(), self.evaluation.stage.split.body.rows);
+        let times: SmallVec<[f64; 4]> = self.times.as_mut().map(|times| times.one(member, state).into()).unwrap_or_default();
+        let samples: SmallVec<[f64; 4]> = self.samples(member, &times).collect();
         let tile = tile_of(&mut self.tiles[0], self.evaluation, self.parameters, self.level, 1);
         let lanes = tile.lanes;
         for (row, number) in state.iter().copied().flatten().take(read.min(n)).enumerate() {
@@ -174,6 +214,8 @@ impl<'a> Evaluator<'a> {
                 tile.rows[(n + row) * lanes] = parameter.0[member];
             }
         }
+        let first = n + self.evaluation.parameters;
+        samples.iter().enumerate().for_each(|(i, sample)| tile.rows[(first + i) * lanes] = *sample);
         tile.run();
         if lanes > 1 {
             (0..results).for_each(|i| tile.values[i] = tile.values[i * lanes]);
@@ -187,6 +229,11 @@ impl<'a> Evaluator<'a> {
         let (n, results, read) = (self.evaluation.states, self.evaluation.values(), self.evaluation.stage.split.body.rows);
         let (evaluation, parameters) = (self.evaluation, self.parameters);
         let many = if is_many { MANY } else { 1 };
+        let times = self.times.as_mut().map(|times| times.run(members, states)).unwrap_or_default();
+        let looked_up = times.len() / members.len().max(1);
+        let samples: Vec<f64> = (0..members.len())
+            .flat_map(|i| self.samples(members[i], &times[i * looked_up..(i + 1) * looked_up]).collect::<SmallVec<[f64; 4]>>())
+            .collect();
         let tile = tile_of(&mut self.tiles[usize::from(is_many)], evaluation, parameters, self.level, many);
         let lanes = tile.lanes;
         let mut values = vec![0.0; members.len() * results];
@@ -203,6 +250,10 @@ impl<'a> Evaluator<'a> {
                 let numbers = tile.row(n + row);
                 numbers.iter_mut().zip(some).for_each(|(to, member)| *to = parameter.0[*member]);
                 numbers[some.len()..].fill(parameter.0[some[some.len() - 1]]);
+            }
+            for row in 0..looked_up {
+                let of_row = samples.iter().skip(first * looked_up + row).step_by(looked_up);
+                tile.row(n + evaluation.parameters + row).iter_mut().zip(of_row).for_each(|(to, sample)| *to = *sample);
             }
             tile.run();
             let to = &mut values[first * results..(first + some.len()) * results];

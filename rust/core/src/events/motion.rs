@@ -8,7 +8,10 @@ use super::{
 };
 use smallvec::SmallVec;
 
-use crate::{isa::Level, model::spec::Row};
+use crate::{
+    isa::Level,
+    model::spec::{Row, Table},
+};
 
 /// The slope of a quantity without derivative is its change over this share of a step, divided by the share.
 const SHORT: f64 = 1.0 / (1u64 << 26) as f64;
@@ -19,11 +22,13 @@ pub struct Values<'a> {
     pub of: Evaluation,
     /// One number for all members, or one for each.
     pub parameters: Vec<Row<'a>>,
+    /// The sampled inputs, if the values depend on such.
+    pub tables: Vec<Table<'a>>,
 }
 
 impl Values<'_> {
     fn evaluator(&self, level: Level) -> Evaluator<'_> {
-        Evaluator::new(&self.of, &self.parameters, level)
+        Evaluator::new(&self.of, &self.parameters, &self.tables, level)
     }
 }
 
@@ -95,6 +100,8 @@ pub struct Events<'a> {
     pub events: Vec<Event<'a>>,
     /// A step, of a time, a length and a state.
     pub step: Values<'a>,
+    /// Whether the steps of the run are such steps, to the last bit; fused ones are not.
+    pub repeats: bool,
     /// By how much a state changes in a step at its rates, of the same numbers.
     pub rates: Values<'a>,
     /// How many numbers a state has, v before y.

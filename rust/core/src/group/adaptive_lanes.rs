@@ -250,6 +250,10 @@ impl AdaptiveBatch for AdaptiveLanes {
         self.tapes.by_terms.is_some()
     }
 
+    fn is_series(&self) -> bool {
+        self.tapes.is_series
+    }
+
     fn find_running(&self, budget: f64, runs: &mut [bool]) {
         let lanes = self.step.lanes();
         Pace::find_running(|i| &self.state[(self.numbers + i) * lanes..][..lanes], budget, runs);
@@ -311,9 +315,18 @@ impl AdaptiveBatch for AdaptiveLanes {
         with_isa!(self.level.of_loops(), |isa| isa.run(sums));
     }
 
-    fn attempt_by_terms(&mut self, spec: &Spec, lane: usize, member: usize) {
-        let Some(stage) = &self.tapes.by_terms else { return };
+    fn attempt_alone(&mut self, spec: &Spec, lane: usize, member: usize) {
         let lanes = self.step.lanes();
+        let Some(stage) = &self.tapes.by_terms else {
+            let before = self.state.to_vec();
+            self.attempt(1);
+            for (row, before) in self.state.chunks_exact_mut(lanes).zip(before.chunks_exact(lanes)) {
+                let made = row[lane];
+                row.copy_from_slice(before);
+                row[lane] = made;
+            }
+            return;
+        };
         let one = self.by_terms.get_or_insert_with(|| OneLane::new(stage, spec, self.level, self.budget));
         let made = one.run(stage, spec, member, &self.state, (lane, lanes));
         for (row, number) in self.state.chunks_exact_mut(lanes).zip(made).take(self.numbers + Pace::<f64>::NUMBERS + self.scales)

@@ -134,9 +134,14 @@ pub trait AdaptiveBatch: Send {
     /// So many attempts of every lane that runs.
     fn attempt(&mut self, attempts: usize);
 
-    /// Whether the coefficients of a series are known after an attempt, so that [`AdaptiveBatch::attempt_by_terms`] needs no
+    /// Whether the coefficients of a series are known after an attempt, so that [`AdaptiveBatch::attempt_alone`] needs no
     /// others.
     fn has_terms(&self) -> bool {
+        false
+    }
+
+    /// Whether steps are those of a series: how long one is follows from its coefficients, which the attempt finds.
+    fn is_series(&self) -> bool {
         false
     }
 
@@ -150,8 +155,8 @@ pub trait AdaptiveBatch: Send {
         1.0
     }
 
-    /// One attempt of one lane, at the start of a step whose coefficients are known.
-    fn attempt_by_terms(&mut self, _spec: &Spec, _lane: usize, _member: usize) {}
+    /// One attempt of one lane, while others stay: of a series at the start of a step whose coefficients are known.
+    fn attempt_alone(&mut self, _spec: &Spec, _lane: usize, _member: usize) {}
 
     /// Whether states within a step are sums of its coefficients alone, which [`AdaptiveBatch::sum_terms`] makes: those of a
     /// series, or of the continuous extension of a method.

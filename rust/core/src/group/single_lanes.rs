@@ -10,7 +10,7 @@ use crate::{
     aligned::Aligned,
     error::Error,
     isa::Level,
-    model::spec::Spec,
+    model::spec::{Spec, holds_at},
     stage::{Clock, PreparedStage},
     step::{
         attempts::TriedRows,
@@ -18,7 +18,6 @@ use crate::{
         pace::Pace,
         tapes::{Tapes, Traced},
     },
-    tape::split::HOLD_SLACK,
 };
 
 /// Members of a system whose attempt is one tape, before the decision.
@@ -39,19 +38,16 @@ pub struct SingleLanes {
 struct Input {
     start: f64,
     interval: f64,
-    last: f64,
     samples: Vec<f32>,
     /// How many lanes have samples of their own; 1 if all have the same.
     lanes: usize,
 }
 
 impl Input {
-    /// The sample of a lane that holds at a time, as `reference/signal.py` has it.
+    /// The sample of a lane that holds at a time.
     fn at(&self, t: f64, lane: usize) -> f32 {
-        let number = ((t - self.start) / self.interval * HOLD_SLACK).floor();
-        let number = if number > 0.0 { number } else { 0.0 };
-        let number = if number < self.last { number } else { self.last };
-        self.samples[number as usize * self.lanes + if self.lanes > 1 { lane } else { 0 }]
+        let number = holds_at(t, self.start, self.interval, self.samples.len() / self.lanes);
+        self.samples[number * self.lanes + if self.lanes > 1 { lane } else { 0 }]
     }
 }
 
@@ -68,8 +64,7 @@ impl SingleLanes {
         let input = |table: &crate::model::spec::Table| {
             let lanes = if table.samples.iter().all(|row| row.is_common()) { 1 } else { lanes };
             let samples = table.samples.iter().flat_map(|row| std::iter::repeat_n(row.at(0) as f32, lanes)).collect();
-            let last = table.samples.len() as f64 - 1.0;
-            Input { start: table.start, interval: table.interval, last, samples, lanes }
+            Input { start: table.start, interval: table.interval, samples, lanes }
         };
         Ok(SingleLanes {
             inputs: spec.tables.iter().map(input).collect(),

@@ -3,10 +3,9 @@
 use crate::{
     model::{
         signal::{Signal, curve},
-        spec::{Parameters, Spec},
+        spec::{Parameters, Spec, holds_at},
         window::{Window, is_held, mean},
     },
-    tape::split::HOLD_SLACK,
 };
 
 /// A sampled input of one member.
@@ -17,12 +16,9 @@ struct Samples {
 }
 
 impl Samples {
-    /// The sample that holds at a time: the last one not after it, or the first or last one outside; the first if the time is a
-    /// NaN.
+    /// The sample that holds at a time.
     fn at(&self, t: f64) -> f64 {
-        let at = ((t - self.start) / self.interval * HOLD_SLACK).floor();
-        let last = self.values.len() - 1;
-        self.values[if at > 0.0 { last.min(at as usize) } else { 0 }]
+        self.values[holds_at(t, self.start, self.interval, self.values.len())]
     }
 }
 

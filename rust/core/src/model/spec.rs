@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use crate::{
     error::Error,
-    tape::{equations::Equations, number::Number, real::Real},
+    tape::{equations::Equations, number::Number, real::Real, split::HOLD_SLACK},
 };
 
 /// The numbers of one parameter or input, for every member; those of fewer members repeat.
@@ -51,6 +51,20 @@ pub struct Table<'a> {
     pub start: f64,
     /// Time from one sample to the next.
     pub interval: f64,
+}
+
+impl Table<'_> {
+    /// The sample of a member that holds at a time.
+    pub(crate) fn at(&self, t: f64, member: usize) -> f64 {
+        self.samples[holds_at(t, self.start, self.interval, self.samples.len())].at(member)
+    }
+}
+
+/// Which of so many samples holds at a time: the last one not after it, or the first or last one outside; the first if the time is a
+/// NaN. As `reference/signal.py` has it.
+pub(crate) fn holds_at(t: f64, start: f64, interval: f64, samples: usize) -> usize {
+    let number = ((t - start) / interval * HOLD_SLACK).floor();
+    if number > 0.0 { (number as usize).min(samples - 1) } else { 0 }
 }
 
 /// Names and sizes of the parameters and inputs: all that a tape depends on, without their values.

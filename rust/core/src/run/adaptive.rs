@@ -377,7 +377,7 @@ impl<'a> Worker<'a> {
             return false;
         }
         let Some(after) = self.behind(member, pace.t) else { return false };
-        self.group.set_pace(lane, pace.crossed(after, self.wall(member, after), self.group.has_terms()));
+        self.group.set_pace(lane, pace.crossed(after, self.wall(member, after), self.group.is_series()));
         true
     }
 
@@ -573,7 +573,7 @@ impl<'a> Worker<'a> {
         let (spec, member) = (&self.plan.model.spec, part.first + assigned.member);
         if !pace.holds() {
             self.group.set_pace(lane, Pace { held: 0.0, ..pace });
-            self.group.attempt_by_terms(spec, lane, member);
+            self.group.attempt_alone(spec, lane, member);
             let accepted = self.group.pace(lane).accepted;
             waypoints::keep_lane(&*self.group, part, lane, assigned, accepted as u64);
             self.waypoints.expect_after(accepted);
@@ -589,7 +589,7 @@ impl<'a> Worker<'a> {
         pace.extra = pace.target - pace.t;
         let origin = self.group.state(lane);
         self.group.set_pace(lane, pace);
-        self.group.attempt_by_terms(spec, lane, member);
+        self.group.attempt_alone(spec, lane, member);
         self.save(part, lane, assigned);
         assigned.next += 1;
         self.group.set_state(lane, &origin);
@@ -770,28 +770,30 @@ impl<'a> Worker<'a> {
         if assigned.next < self.plan.at.len() || pace.held <= 0.0 {
             return None;
         }
-        self.looks.as_ref()?;
-        let (h, state, t) = if self.group.has_terms() {
-            self.end_of_held(lane, member, pace)
-        } else {
-            (length(pace.t, pace.h, pace.wall), None, pace.wall.min(pace.t + pace.h))
-        };
+        let (repeats, is_series) = (self.looks.as_ref()?.watch.motion.events.repeats, self.group.is_series());
+        let (mut h, mut t) = (length(pace.t, pace.h, pace.wall), pace.wall.min(pace.t + pace.h));
+        let end = (is_series || !repeats).then(|| self.end_of_held(lane, member, pace));
+        if let Some((following, _)) = end.as_ref().filter(|_| is_series) {
+            (h, t) = (following.h, following.t);
+        }
         let t = if t < pace.wall { t } else { self.behind(member, t).unwrap_or(t) };
-        let h = if state.is_some() { length(t, h, self.wall(member, t)) } else { h };
+        let h = if is_series { length(t, h, self.wall(member, t)) } else { h };
+        let state = end.map(|(_, state)| state);
         let last = self.last(member);
         self.looks.as_mut()?.held(&*self.group, lane, member, pace, (HeldEnd { h, t, state }, last))
     }
 
-    /// The length of a held step of a series, as its end says, the state and the time there; the lane is left as it is.
-    fn end_of_held(&mut self, lane: usize, member: usize, pace: &Pace<f64>) -> (f64, Option<Vec<f64>>, f64) {
+    /// Where a lane stands at the end of a held step, and the state there; it is left as it is. The step that follows is as long as
+    /// the held one of a series is.
+    fn end_of_held(&mut self, lane: usize, member: usize, pace: &Pace<f64>) -> (Pace<f64>, Vec<f64>) {
         let (start, scales) = (self.group.state(lane), self.group.scales(lane));
         self.group.set_pace(lane, Pace { held: 0.0, extra: 0.0, target: f64::INFINITY, ..*pace });
-        self.group.attempt_by_terms(&self.plan.model.spec, lane, member);
-        let (end, state) = (self.group.pace(lane), self.group.state(lane));
+        self.group.attempt_alone(&self.plan.model.spec, lane, member);
+        let end = (self.group.pace(lane), self.group.state(lane));
         self.group.set_state(lane, &start);
         self.group.set_scales(lane, &scales);
         self.group.set_pace(lane, *pace);
-        (end.h, Some(state), end.t)
+        end
     }
 
     /// Ends a member where an event stopped it: in that state, also at all later times. Or it goes on from there, as a run begins.
@@ -812,7 +814,7 @@ impl<'a> Worker<'a> {
             assigned.next = self.plan.at.iter().position(|at| at.at(member) >= stop.t).unwrap_or(times);
             self.group.set_state(lane, &stop.state);
             self.group.set_pace(lane, pace.again());
-            if self.group.has_terms() {
+            if self.group.is_series() {
                 let mut scales = self.group.scales(lane);
                 let first = scales.len() - stop.state.len();
                 scales[first..].fill(0.0); // no more digits of this state are known

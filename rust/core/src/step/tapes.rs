@@ -39,6 +39,8 @@ pub struct Tapes<T: Real = f64> {
     /// The same attempt by coefficients that are known, behind the state: saved states, and a held step when it is taken. Not
     /// where operations are fused, for the attempt may fuse what made the coefficients.
     pub by_terms: Option<Stage<T>>,
+    /// Whether steps are those of a series.
+    pub is_series: bool,
     /// Whether a saved state within such an attempt is the sum of the series alone.
     pub sums: bool,
     /// The second part of an attempt of float32, which is of float64, and where the rows of both parts are; `step` is the first.
@@ -285,7 +287,8 @@ impl TapeKey {
         let written = steps.tape.written(steps.next.iter().copied());
         let series_evaluations = steps.tape.series_evaluations();
         let (mut next, mut by_terms, mut sums) = (steps.next, None, false);
-        if !steps.terms.is_empty() && !self.fused {
+        let is_series = !steps.terms.is_empty();
+        if is_series && !self.fused {
             let (tape, by, projects) = trace_by_terms(new(), &self.signature, &self.how, steps.shape, steps.terms.len())?;
             (by_terms, sums) = (Some(Stage::cut(&self.signature, &(tape, by))), !projects);
             next.extend(steps.terms);
@@ -303,6 +306,7 @@ impl TapeKey {
         Ok(Tapes {
             step,
             by_terms,
+            is_series,
             sums,
             judged,
             begin,

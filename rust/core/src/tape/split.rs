@@ -76,16 +76,22 @@ impl Body {
         body
     }
 
-    /// Values as the next state, of numbers that all are rows: first `states` ones of the state, then parameters.
-    pub(crate) fn of_values(tape: &Tape, values: &[Id], states: u32) -> Body {
+    /// Values as the next state, of numbers that all are rows: first `states` ones of the state, then so many parameters, then
+    /// samples; of these the tables and the times.
+    pub(crate) fn of_values(tape: &Tape, values: &[Id], states: u32, parameters: u32) -> (Body, Vec<(u32, Id)>) {
+        let mut samples = Vec::new();
         let mut body = Body::of(tape, values, &mut |id| match tape.op(id) {
             Op::State(i) => Some(Op::Row(i)),
             Op::Param(i) => Some(Op::Row(states + i)),
+            Op::Sample(table, t) => {
+                samples.push((table, t));
+                Some(Op::Row(states + parameters + samples.len() as u32 - 1))
+            }
             _ => None,
         });
         body.copy_what_is_shared();
         body.count_leaves();
-        body
+        (body, samples)
     }
 
     /// Numbers the leaves of a kind in the order in which they are read, for sequential access to memory. `list` has their

@@ -122,14 +122,17 @@ impl<'a> Looks<'a> {
     /// The slopes of these lanes over steps of the present lengths.
     fn find_slopes(&mut self, group: &dyn AdaptiveBatch, lanes: &[(usize, usize)]) {
         let (n, sign) = (self.events.numbers, self.events.sign);
-        fill(self.rates.row(0), group.row(n), 1.0);
-        fill(self.rates.row(1), Some(&self.h), 1.0);
-        (0..n).for_each(|i| fill(self.rates.row(2 + i), group.row(i), 1.0));
-        self.rates.run();
+        let in_lanes = !self.events.rates.of.has_samples();
+        if in_lanes {
+            fill(self.rates.row(0), group.row(n), 1.0);
+            fill(self.rates.row(1), Some(&self.h), 1.0);
+            (0..n).for_each(|i| fill(self.rates.row(2 + i), group.row(i), 1.0));
+            self.rates.run();
+        }
         let width = self.h.len();
         for (e, quantity) in self.quantities.iter_mut().enumerate() {
             quantity.slopes_before.copy_from_slice(&quantity.slopes);
-            let Some(tile) = &mut quantity.slope else {
+            let Some(tile) = quantity.slope.as_mut().filter(|_| in_lanes) else {
                 let mut at = States::default();
                 for (lane, member) in lanes {
                     let state: Vec<f64> = (0..n).map(|i| group.row(i).map_or(f64::NAN, |row| row[*lane])).collect();
@@ -212,7 +215,7 @@ impl<'a> Looks<'a> {
             }
         }
         let mut candidates = Vec::new();
-        if group.has_terms() {
+        if group.is_series() {
             // How long a step of a series is follows from its coefficients, which the attempt finds.
             let [t, h, wall] = [places.t, places.h, places.wall].map(row);
             made.iter().for_each(|(lane, _)| self.h[*lane] = length(t[*lane], h[*lane], wall[*lane]));

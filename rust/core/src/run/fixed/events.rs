@@ -117,7 +117,8 @@ impl<'w, 'a> Looks<'w, 'a> {
     pub(super) fn new(watch: &'w mut Watch<'a>, notices: bool, lanes: usize, first: usize, count: usize) -> Self {
         let (events, remembered) = (watch.events(), if watch.changes() { count } else { 0 });
         let memories = (first..first + remembered).map(|member| Memory::new(member, events)).collect();
-        Looks::with(watch, notices, lanes, (first, count), memories)
+        let in_lanes = !watch.motion.events.repeats;
+        Looks { in_lanes, ..Looks::with(watch, notices, lanes, (first, count), memories) }
     }
 
     /// With what is known of them.
