@@ -329,7 +329,7 @@ class Tape:
     def evaluation(self, of: list[Symbol], states: int) -> Evaluation | None:
         """These values for many members at once, from so many numbers of a state and from parameters.
 
-        None if they depend on a step, a time or a sampled input.
+        None if they depend on a step or a time.
         """
 
     def written(self, of: list[Symbol]) -> dict[str, int]:
@@ -451,9 +451,9 @@ def stages(model: ModelSpec, *, choice: int = 0, attempts: bool = False, extends
     """The cut tapes of a run, each stage as one tape, for a machine that the core does not write code for.
 
     ``v``, ``y``, ``kept``, ``memory``, ``tally`` and ``recorded`` are how many numbers of a member there are; ``carries`` is
-    whether the method has a carry. ``splits`` has by name, "step" and "start", "finish", "record", "begin", "judged", "by terms"
-    where they are, and "extension" where it ``extends``, what ``compiled`` has as ``split``. ``tried`` is None but for attempts
-    of float32.
+    whether the method has a carry, ``is_series`` whether attempts are those of a series. ``splits`` has by name, "step" and
+    "start", "finish", "record", "begin", "judged", "by terms" where they are, and "extension" where it ``extends``, what
+    ``compiled`` has as ``split``. ``tried`` is None but for attempts of float32.
     """
 
 def tape_number(model: ModelSpec, *, choice: int = 0, attempts: bool = False) -> int:

@@ -267,6 +267,7 @@ OPTIONS: dict[str, dict[str, Any]] = {
     "force": {"force": of_each(3)[0]},
     "absolute": {"tolerance": (1e-5, 1e-7)},
     "fused": {"fused": True},
+    "fused, jumps": {"fused": True, "jumps": [0.5, 3.0]},
     "dense": {"at": np.linspace(0.0, 3.0, 400)},
     "float32": {"dtype": "float32", "tolerance": 1e-5},
     "float32, fused, every": {"dtype": "float32", "tolerance": 1e-4, "fused": True, "every": 2, "at": [3.0]},
@@ -282,7 +283,7 @@ FEW_OPTIONS = ("own start", "jumps", "own jumps", "every", "first step and longe
 def is_everyday(option: str, method: str) -> bool:
     if method == "merson":
         return option != "float32, fused, every"
-    return option in FEW_OPTIONS or (option, method) == ("jumps backward", "taylor")
+    return option in FEW_OPTIONS or (option, method) in (("jumps backward", "taylor"), ("fused, jumps", "taylor"))
 
 
 @pytest.mark.parametrize("method", ["merson", "rosenbrock23", "taylor"])

@@ -456,8 +456,10 @@ def test_large_members_and_jumps_are_the_same_by_the_reference() -> None:
     large = {"v": np.zeros((300, 1)), "y": np.sin(np.arange(300.0))[:, np.newaxis], "max_steps": 100}
     assert_equal_ways(sw.Chain(300), "merson", ways=("by the reference",), tolerance=1e-4, at=[0.5], every=1, **large)
     jumps: dict[str, Any] = {"v": np.zeros(2), "y": np.ones(2), "at": [2.0], "jumps": [0.7]}
-    run = assert_equal_ways(sw.Oscillator(), "merson", ways=("by the reference", "alone"), tolerance=1e-5, every=1, **jumps)
-    assert np.abs(run.t - 0.7).min() < 1e-14
+    for more in ({"method": "merson"}, {"method": "taylor"}, {"method": "taylor", "fused": True}):
+        options = {"tolerance": 1e-5, "every": 1, **jumps, **more}
+        run = assert_equal_ways(sw.Oscillator(), ways=("by the reference", "alone"), **options)
+        assert np.abs(run.t - 0.7).min() < 1e-14
 
 
 def test_kept_steps_with_events() -> None:

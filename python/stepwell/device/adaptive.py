@@ -459,11 +459,11 @@ class _Kernels:
 
     def cross(self) -> list[str]:
         """Statements that bring a member that has come to a wall behind it."""
-        of, series = self.of, "by terms" in self.texts
+        of = self.of
         t, h, wall, before = (of[name] for name in ("t", "h", "wall", "before"))
         factor = MIN_FACTOR.hex()
         chosen = [f"{before} = {factor} * {before};"]
-        if not series:
+        if not self.stages.is_series:
             chosen = [
                 f"const double least = {MOVES.hex()} * fabs(after), shorter = {factor} * {h};",
                 f"{h} = {longer('shorter', 'least')};",

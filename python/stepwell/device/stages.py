@@ -61,6 +61,7 @@ class Stages:
     Attributes:
         sizes: how many numbers of a member v and y have, the method keeps, a controller remembers, are summed up, are recorded.
         carries: whether the method has a carry instead of v.
+        is_series: whether attempts are those of a series.
         texts: by name, "step" and those around it.
     """
 
@@ -69,7 +70,7 @@ class Stages:
         made = _core.stages(model, choice=choice, attempts=attempts, extends=extends)
         self.single, self.tried = single, made["tried"]
         self.sizes = {name: int(made[name]) for name in ("v", "y", "kept", "memory", "tally", "recorded")}
-        self.carries = bool(made["carries"])
+        self.carries, self.is_series = bool(made["carries"]), bool(made["is_series"])
         self.sources: list[tuple[str, int]] = []
         self.params: list[int] = []
         self.uniforms = 0

@@ -528,6 +528,7 @@ fn stages<'py>(py: Python<'py>, model: &ModelSpec, choice: usize, attempts: bool
         d.set_item(name, size)?;
     }
     d.set_item("carries", stages.carries)?;
+    d.set_item("is_series", stages.is_series)?;
     d.set_item("tried", stages.tried)?;
     let splits = PyDict::new(py);
     for (name, split) in &stages.splits {

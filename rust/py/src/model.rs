@@ -295,11 +295,7 @@ impl ModelSpec {
     pub fn model<'a>(&'a self, how: StepKind, rows: &'a Rows<'_>, tables: &'a Tables<'_>) -> PyResult<Model<'a>> {
         let mut all = Vec::new();
         rows.iter().try_for_each(|array| add_rows(array, &mut all))?;
-        let spec = Spec {
-            signature: self.signature.clone(),
-            rows: all,
-            tables: self::tables(tables)?,
-        };
+        let spec = Spec { signature: self.signature.clone(), rows: all, tables: self::tables(tables)? };
         let Self { signature, record, fused, precision, .. } = self;
         // The matrix form says itself which products are fused, whatever they are made of.
         let fused = *fused && !matches!(how, StepKind::Matrix { .. });

@@ -302,6 +302,11 @@ impl Evaluation {
         state: Vec<Numbers<'_>>,
         parameters: Vec<Numbers<'_>>,
     ) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        if self.0.has_samples() {
+            return Err(argument_error(
+                "expected values that depend on no samples, which are looked up for events alone".to_owned(),
+            ));
+        }
         let state = state.iter().map(|each| Ok(Row(each.slice()?))).collect::<PyResult<Vec<Row>>>()?;
         let parameters = parameters.iter().map(|each| Ok(Row(each.slice()?))).collect::<PyResult<Vec<Row>>>()?;
         for row in state.iter().chain(&parameters) {
@@ -477,8 +482,8 @@ impl Tape {
         Ok((Tape(fused), symbols))
     }
 
-    /// These values for many members at once, from so many numbers of a state and from parameters; None if they depend on a step,
-    /// a time or a sampled input.
+    /// These values for many members at once, from so many numbers of a state and from parameters; None if they depend on a step or
+    /// a time. Where they depend on samples, events alone take them.
     fn evaluation(&self, of: Vec<PyRef<'_, Symbol>>, states: usize) -> PyResult<Option<Evaluation>> {
         let (tape, roots) = self.with(&of)?;
         Ok(evaluation::Evaluation::new(&tape, &roots, states).map_err(core_error)?.map(Evaluation))

@@ -305,8 +305,8 @@ class _Resetting(_Driver):
         return by_core.sought(self, self._resets.new_states, self.jumps)
 
     def goes_in_lanes(self) -> bool:
-        """Where a run goes on, parts begin otherwise than a run does; a control's sum would end at a change."""
-        return self.pacing.begins and self.plan.system.control is None
+        """A control's sum would end at a change."""
+        return self.plan.system.control is None
 
     def made(self, sought: by_core.Sought, paces: Array, v: Array, y: Array) -> engine.Adapted | None:
         try:

@@ -231,8 +231,7 @@ class _Resetting(_Driver):
         self.later: list[tuple[Whole, At, int]] = []
 
     def _sought(self) -> by_core.Sought | None:
-        # The blocks that a method keeps beside the state are begun anew for all members of a group.
-        return None if self.plan.method.kept else by_core.sought(self, self.resets.new_states)
+        return by_core.sought(self, self.resets.new_states)
 
     def _by_core(self, sought: by_core.Sought, v: Array, y: Array, bad: Whole, carried: bool) -> engine.Outcome:
         out = super()._by_core(sought, v, y, bad, carried)

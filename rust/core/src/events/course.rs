@@ -44,12 +44,16 @@ impl Course {
 }
 
 impl Watch<'_> {
-    /// The run of a member from a time and a state to an end.
-    pub(crate) fn course(&mut self, member: usize, [begin, end]: [f64; 2], state: &[f64]) -> Course {
+    /// The run of a member from a time to an end, and from a state; without one it goes on, and its first part is that of an earlier
+    /// run.
+    pub(crate) fn course(&mut self, member: usize, [begin, end]: [f64; 2], state: Option<&[f64]>) -> Course {
         let mut memory = Memory::new(member, self.events());
-        self.begin_member(&mut memory, begin, SHARE_OF_RUN * (end - begin), state, false);
-        let (flight, ratio, state) = (f64::NAN, f64::NAN, state.into());
-        Course { memory, begin, end, start: begin, state, flight, ratio, recent: begin, changes: 0 }
+        if let Some(state) = state {
+            self.begin_member(&mut memory, begin, SHARE_OF_RUN * (end - begin), state, false);
+        }
+        let (start, flight, ratio) = (if state.is_some() { begin } else { f64::NAN }, f64::NAN, f64::NAN);
+        let state = state.map_or_else(|| smallvec![f64::NAN; self.motion.events.numbers], Numbers::from_slice);
+        Course { memory, begin, end, start, state, flight, ratio, recent: begin, changes: 0 }
     }
 
     /// Takes a step of a member in which events may occur. Returns where it stops, or goes on in another state.

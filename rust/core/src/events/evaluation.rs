@@ -189,7 +189,8 @@ fn tile_of<'t>(
 impl<'a> Evaluator<'a> {
     pub(crate) fn new(evaluation: &'a Evaluation, parameters: &'a [Row<'a>], tables: &'a [Table<'a>], level: Level) -> Self {
         let parameters = &parameters[..evaluation.parameters.min(parameters.len())];
-        let times = evaluation.samples.as_ref().map(|samples| Box::new(Evaluator::new(&samples.times, parameters, tables, level)));
+        let times =
+            evaluation.samples.as_ref().map(|samples| Box::new(Evaluator::new(&samples.times, parameters, tables, level)));
         Evaluator { evaluation, parameters, tables, level, tiles: [None, None], times }
     }
 

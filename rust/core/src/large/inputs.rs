@@ -1,11 +1,9 @@
 //! Inputs of one member, by number.
 
-use crate::{
-    model::{
-        signal::{Signal, curve},
-        spec::{Parameters, Spec, holds_at},
-        window::{Window, is_held, mean},
-    },
+use crate::model::{
+    signal::{Signal, curve},
+    spec::{Parameters, Spec, holds_at},
+    window::{Window, is_held, mean},
 };
 
 /// A sampled input of one member.

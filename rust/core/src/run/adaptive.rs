@@ -79,7 +79,9 @@ pub fn run(plan: &AdaptiveRun, arrays: Arrays, monitor: &mut dyn FnMut(f64) -> b
     let stop = Stop::default();
     let worker = || Worker::new(plan, &traced, &stop);
     let mine = worker()?;
-    if plan.begins && !mine.group.begins() {
+    // A member that goes on from an event begins there.
+    let begins = plan.begins || mine.looks.as_ref().is_some_and(|looks| looks.watch.changes());
+    if begins && !mine.group.begins() {
         return Ok(false);
     }
     let lanes = mine.group.lanes();
@@ -425,7 +427,8 @@ impl<'a> Worker<'a> {
         if let Some(looks) = &mut self.looks {
             // A held step was looked at before, up to the last time of the run that goes on.
             looks.begin(lane, at, if pace.held > 0.0 { pace.target } else { f64::NEG_INFINITY });
-            looks.begin_course(lane, at, plan.at.last().map_or(f64::NAN, |row| row.at(at)), &state);
+            let end = plan.at.last().map_or(f64::NAN, |row| row.at(at));
+            looks.begin_course((lane, at), [pace.t, end], plan.begins.then_some(&state));
         }
         self.group.set_pace(lane, Pace { target: pace.t, wall: self.wall(at, pace.t), ..pace });
         Assignment {

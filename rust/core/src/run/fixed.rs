@@ -512,7 +512,7 @@ impl<T: Real> Job<'_, '_, '_, T> {
             Some(mut looks) => {
                 let (from, count) = (self.from, self.count);
                 let mut on = Stepped {
-                    carries: self.carries,
+                    carries: self.carries || !self.group.kept().is_empty(),
                     spec: Some(&self.plan.model.spec),
                     first: self.part.first + from,
                     count,

@@ -17,6 +17,8 @@ pub struct Stages {
     pub sizes: [(&'static str, usize); 6],
     /// Whether the method has a carry instead of v between steps.
     pub carries: bool,
+    /// Whether attempts are those of a series.
+    pub is_series: bool,
     /// Each by its name: "step", and, where there is one, "start", "finish", "record", "begin", "judged", "by terms" and "extension".
     pub splits: Vec<(&'static str, Split)>,
     /// Of attempts of float32, where their rows stand: numbers of the state, sampled inputs, results of the first part, and numbers
@@ -55,6 +57,7 @@ fn stages<T: Real>(traced: &Traced, tapes: &Tapes<T>) -> Stages {
             ("recorded", traced.recorded),
         ],
         carries: traced.carries,
+        is_series: tapes.is_series,
         splits,
         tried: tapes.judged.as_ref().map(|(_, rows)| [rows.state, rows.tables, rows.results, rows.judged]),
     }

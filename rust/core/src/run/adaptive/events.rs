@@ -81,10 +81,12 @@ impl<'a> Looks<'a> {
         }
     }
 
-    /// Where events change the state of a lane's member: its run begins in this state, at a time and until another.
-    pub(super) fn begin_course(&mut self, lane: usize, member: usize, end: f64, state: &[f64]) {
+    /// Where events change the state of a lane's member: its run is from a time until another, and begins in this state; without one it
+    /// goes on.
+    pub(super) fn begin_course(&mut self, (lane, member): (usize, usize), [t, end]: [f64; 2], begins: Option<&Vec<f64>>) {
         if self.watch.changes() {
-            self.courses[lane] = Some(self.watch.course(member, [self.events.begin.at(member), end], state));
+            let begin = if begins.is_some() { self.events.begin.at(member) } else { t };
+            self.courses[lane] = Some(self.watch.course(member, [begin, end], begins.map(Vec::as_slice)));
         }
     }
 

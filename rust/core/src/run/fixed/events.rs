@@ -39,7 +39,7 @@ pub(in crate::run) struct Looks<'w, 'a> {
     carried: Vec<f64>,
     /// The quantities in these states.
     values: Vec<f64>,
-    /// What the lanes carry in place of v in each of these states, if events change some.
+    /// What the lanes carry in place of v in each of these states, and what the method keeps, if events change some.
     slots: Vec<f64>,
     /// States that events gave to members, of a method that carries something else than v: from one step on until before another.
     given: Vec<Vec<([i64; 2], Numbers)>>,
@@ -273,7 +273,7 @@ struct Seen {
 /// Members that are stepped together, and how.
 pub struct Stepped<'s, T: Real> {
     pub(in crate::run) group: &'s mut dyn Group<T>,
-    /// The v slot holds something else than v between steps.
+    /// The v slot holds something else than v between steps, or the method keeps more than v and y.
     pub(in crate::run) carries: bool,
     /// None where steps are made one by one.
     pub(in crate::run) spec: Option<&'s Spec<'s>>,
@@ -516,10 +516,17 @@ impl Looks<'_, '_> {
             return;
         }
         on.group.start(k);
-        let (v, carried) = (on.group.slots_mut().0, &self.slots[made * p * lanes..(made + 1) * p * lanes]);
-        for lane in (0..lanes).filter(|lane| !changed.iter().any(|(other, _)| other == lane)) {
-            v.iter_mut().skip(lane).step_by(lanes).zip(carried.iter().skip(lane).step_by(lanes)).for_each(|(to, x)| *to = *x);
-        }
+        let of_state = self.slots.len() / (self.states.len() / block);
+        let mut carried = &self.slots[made * of_state..(made + 1) * of_state];
+        let mut restore = |slot: &mut [f64]| {
+            let (mine, others) = carried.split_at(slot.len());
+            carried = others;
+            for lane in (0..lanes).filter(|lane| !changed.iter().any(|(other, _)| other == lane)) {
+                slot.iter_mut().skip(lane).step_by(lanes).zip(mine.iter().skip(lane).step_by(lanes)).for_each(|(to, x)| *to = *x);
+            }
+        };
+        restore(on.group.slots_mut().0);
+        on.group.kept_mut().into_iter().for_each(restore);
     }
 
     /// Makes steps with events that change states: those of members at which nothing happens in the lanes, all others again.
@@ -690,6 +697,7 @@ impl Looks<'_, '_> {
             self.carried.extend_from_slice(on.group.slots().0);
             if self.changes() {
                 self.slots.extend_from_slice(&self.carried);
+                on.group.kept().into_iter().for_each(|block| self.slots.extend_from_slice(block));
             }
             on.group.finish(k);
         }
