@@ -175,6 +175,11 @@ def test_fused_steps_and_sampled_inputs_too(more: dict[str, Any], way: str | Non
     check_the_core_follows_as_the_reference_does(numbers, way, **more)
 
 
+@pytest.mark.parametrize("more", [{}, {"fused": True}, {"known": True}], ids=str)
+def test_float32_too(more: dict[str, Any]) -> None:
+    check_the_core_follows_as_the_reference_does(range(240, 260), dtype="float32", **more)
+
+
 @pytest.mark.parametrize(("way", "fused"), [("many times", False), ("back", False), ("jumps", True)])
 def test_runs_that_go_on_too(way: str, fused: bool) -> None:
     """From a held step, within which there may be events; and again, where no member has ended."""
@@ -318,7 +323,7 @@ def test_a_kick_at_the_end_of_a_step_wakes_what_is_at_rest(backend: Any) -> None
 
 
 def test_no_member_waits_for_others(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Steps with events that change the state are the core's, but in float32 and of a series that goes on."""
+    """Steps with events that change the state are the core's, but in float32 by verlet, and of a series that goes on."""
     grouped: list[int] = []
     group = driver._Resetting._group
     monkeypatch.setattr(driver._Resetting, "_group", lambda self, *of: grouped.append(1) or group(self, *of))
@@ -329,10 +334,11 @@ def test_no_member_waits_for_others(monkeypatch: pytest.MonkeyPatch) -> None:
     for method in CARRYING:
         assert sw.integrate(falling, method, **options).events["bounce"].count.sum() >= 5
     held = sw.Sampled([0.0, 0.1], interval=0.5)
-    for more in ({"system": driven(f=0.0), "fused": True}, {"system": driven(f=held)}):
+    of_fused, of_single = {"system": driven(f=0.0), "fused": True}, {"system": falling, "dtype": "float32"}
+    for more in (of_fused, of_single, {"system": driven(f=held)}):
         assert sw.integrate(**{"method": "rk4", **options, **more}).events["bounce"].count.sum() >= 4
     assert not grouped
-    assert sw.integrate(falling, "rk4", dtype="float32", **options).events["bounce"].count.sum() >= 5
+    assert sw.integrate(falling, "verlet", dtype="float32", **options).events["bounce"].count.sum() >= 5
     assert grouped
     looked: list[int] = []
     look = adaptive._Resetting.look

@@ -8,7 +8,7 @@ use stepwell_core::{
     events::{
         self, Brackets,
         found::{Found, Rest},
-        motion::{self, Events},
+        motion::{self, Events, Trial},
     },
     isa::Level,
     model::spec::Row,
@@ -16,7 +16,7 @@ use stepwell_core::{
 
 use crate::{
     model::{Tables, argument_error, core_error, tables},
-    tape::Evaluation,
+    tape::{Evaluation, Values},
 };
 
 /// Values of a tape, with their parameters: see `Values` in `runs/events/by_core.py`.
@@ -84,11 +84,17 @@ fn row<'a>(numbers: &'a PyReadonlyArray1<'_, f64>, members: usize) -> PyResult<R
 impl ValuesOf<'_> {
     fn of_core(&self, members: usize) -> PyResult<motion::Values<'_>> {
         let parameters = self.parameters.iter().map(|numbers| row(numbers, members)).collect::<PyResult<_>>()?;
-        Ok(motion::Values { of: self.of.get().0.clone(), parameters, tables: tables(&self.tables)? })
+        Ok(motion::Values { of: self.of.get().double()?.clone(), parameters, tables: tables(&self.tables)? })
     }
 }
 
 impl EventsOf<'_> {
+    fn step_of_core(&self, members: usize) -> PyResult<Trial<'_>> {
+        let Values::Single(of) = &self.step.of.get().0 else { return self.step.of_core(members).map(Trial::Double) };
+        let parameters = self.step.parameters.iter().map(|numbers| row(numbers, members)).collect::<PyResult<_>>()?;
+        Ok(Trial::Single(motion::Values { of: of.clone(), parameters, tables: Vec::new() }))
+    }
+
     /// As the core takes them.
     pub(crate) fn of_core(&self, members: usize) -> PyResult<Events<'_>> {
         let events = self
@@ -109,7 +115,7 @@ impl EventsOf<'_> {
         let found = Mutex::new(Found::new(events.len(), members));
         Ok(Events {
             events,
-            step: self.step.of_core(members)?,
+            step: self.step_of_core(members)?,
             repeats: self.repeats,
             rates: self.rates.of_core(members)?,
             numbers: self.numbers,

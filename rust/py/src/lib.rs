@@ -125,9 +125,21 @@ fn run_and_look(
     arrays: Bound<'_, PyAny>,
     events: events::EventsOf<'_>,
 ) -> PyResult<(bool, events::AllFound)> {
-    let arrays: ArraysOf<'_, f64> = arrays.extract()?;
+    match model.precision {
+        Precision::Double => look_with::<f64>(py, model, plan, arrays.extract()?, &events),
+        Precision::Single => look_with::<f32>(py, model, plan, arrays.extract()?, &events),
+    }
+}
+
+fn look_with<T: Steppable + Element>(
+    py: Python<'_>,
+    model: &ModelSpec,
+    plan: PlanOf,
+    arrays: ArraysOf<'_, T>,
+    events: &events::EventsOf<'_>,
+) -> PyResult<(bool, events::AllFound)> {
     let events = events.of_core(arrays.first_bad.as_array().len())?;
-    let diverged = run_with::<f64>(py, model, plan, arrays, Some(&events))?;
+    let diverged = run_with(py, model, plan, arrays, Some(&events))?;
     Ok((diverged, events::found(py, &events)))
 }
 

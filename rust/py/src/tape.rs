@@ -274,7 +274,24 @@ impl Symbol {
 
 /// Values of a tape for many members at once.
 #[pyclass(module = "stepwell._core", frozen)]
-pub struct Evaluation(pub(crate) evaluation::Evaluation);
+pub struct Evaluation(pub(crate) Values);
+
+/// Of 64 bits, or of 32.
+#[derive(Clone)]
+pub(crate) enum Values {
+    Double(evaluation::Evaluation),
+    Single(evaluation::Evaluation<f32>),
+}
+
+impl Evaluation {
+    /// Values of 64 bits.
+    pub(crate) fn double(&self) -> PyResult<&evaluation::Evaluation> {
+        match &self.0 {
+            Values::Double(values) => Ok(values),
+            Values::Single(_) => Err(argument_error("expected values of 64 bits".to_owned())),
+        }
+    }
+}
 
 /// One number for all members, or one for each.
 #[derive(FromPyObject)]
@@ -302,7 +319,8 @@ impl Evaluation {
         state: Vec<Numbers<'_>>,
         parameters: Vec<Numbers<'_>>,
     ) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        if self.0.has_samples() {
+        let of = self.double()?;
+        if of.has_samples() {
             return Err(argument_error(
                 "expected values that depend on no samples, which are looked up for events alone".to_owned(),
             ));
@@ -314,11 +332,11 @@ impl Evaluation {
                 return Err(argument_error(format!("expected one number or {members}, got {}", row.0.len())));
             }
         }
-        let values = PyArray2::zeros(py, [self.0.values(), members], false);
+        let values = PyArray2::zeros(py, [of.values(), members], false);
         let level = machine()?.level;
         if members > 0 {
             let mut out = values.readwrite();
-            self.0.run(level, (&state, &parameters), members, out.as_slice_mut()?);
+            of.run(level, (&state, &parameters), members, out.as_slice_mut()?);
         }
         Ok(values)
     }
@@ -486,7 +504,11 @@ impl Tape {
     /// a time. Where they depend on samples, events alone take them.
     fn evaluation(&self, of: Vec<PyRef<'_, Symbol>>, states: usize) -> PyResult<Option<Evaluation>> {
         let (tape, roots) = self.with(&of)?;
-        Ok(evaluation::Evaluation::new(&tape, &roots, states).map_err(core_error)?.map(Evaluation))
+        let of = match tape.precision() {
+            Precision::Double => evaluation::Evaluation::new(&tape, &roots, states).map(|of| of.map(Values::Double)),
+            Precision::Single => evaluation::Evaluation::new(&tape, &roots, states).map(|of| of.map(Values::Single)),
+        };
+        Ok(of.map_err(core_error)?.map(Evaluation))
     }
 
     /// How often each kind of operation was asked for in a step, if these values are its next state.

@@ -92,7 +92,7 @@ def sought(search: Collected, new_states: dict[int, NewState] | None = None, jum
     ``new_states`` are those that events give members, by the numbers of these; ``jumps`` are those of adaptive steps.
     """
     plan = search.plan
-    is_plain = bool(search.events) and plan.backend == "rust" and plan.device is None and not plan.single
+    is_plain = bool(search.events) and plan.backend == "rust" and plan.device is None
     if not is_plain or plan.system.controller is not None or plan.system.mass_matrix is not None:
         return None
     step, rates = search.trials.of_core("step"), search.trials.of_core("rates")
@@ -126,7 +126,18 @@ def sought(search: Collected, new_states: dict[int, NewState] | None = None, jum
         rows = jumps.reshape(len(jumps), -1)
         known = TimesOfCore(*2 * [np.concatenate([rows, np.full((1, rows.shape[1]), np.inf)])])
     n = prod(plan.system.v_shape) + prod(plan.system.y_shape)
-    return Sought(events, both[0], not plan.fused, both[1], n, engine.groups_of(plan), begin, search.sign, search.way, known)
+    return Sought(
+        events,
+        both[0],
+        not (plan.fused or plan.single),
+        both[1],
+        n,
+        engine.groups_of(plan),
+        begin,
+        search.sign,
+        search.way,
+        known,
+    )
 
 
 def _values(evaluated: Evaluated, numbers: list[Array], tables: Sequence[Any] = ()) -> Values | None:

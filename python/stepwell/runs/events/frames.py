@@ -60,7 +60,7 @@ class Frames(Collected):
         self._rests = np.full(plan.members, -1)
         self._left: tuple[list[Array], list[Array]] | None = None
         #: Whether the core looks for events; what it looks for, None where that has changed; and the force that it knows.
-        self._by_core = True
+        self._by_core = not plan.single
         self._sought: by_core.Sought | None = None
         self._force: Array | None = None
 

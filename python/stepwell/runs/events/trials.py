@@ -87,7 +87,21 @@ class Trials:
 
     def of_core(self, what: str) -> tuple[Evaluated, list[Array]] | None:
         """A "step" or the "rates" as operations, with the values of their parameters, if they are traced."""
+        if self._plan.single:
+            return self._single_of_core(what)
         return self._traced_step() if what == "step" else self._traced_rates()
+
+    def _single_of_core(self, what: str) -> tuple[Evaluated, list[Array]] | None:
+        """The same of float32, whose rates are those of float64; not of a method that carries or keeps something."""
+        plan, control = self._everyone, self._plan.system.control
+        if self._adaptive or plan.method.begins or control is not None or self._number is None:
+            return None
+        if what == "rates":
+            return self._traced("rates", self._changes)
+        tracer, tape, values = by_tape.traced(plan, "step")
+        if plan.fuses:
+            tape, values = tape.fused(values)
+        return Evaluated(tape, values, 2 + len(values), by_core=False), [np.atleast_1d(each) for each in tracer.numbers]
 
     def _traced_step(self) -> tuple[Evaluated, list[Array]] | None:
         if not self._is_traced:
@@ -142,12 +156,12 @@ class Trials:
     def _trace_rates(self) -> tuple[Evaluated, list[Array]] | None:
         if not self._by_core and not isinstance(self._plan.system, OwnSystem):
             return None
+        return self._traced("rates", self._changes)
 
-        def rates(tracer: Tracer, plan: engine.Plan, t: Any, h: Any, v: Any, y: Any) -> tuple[Any, Any]:
-            s = self._scaled_symbols(tracer, h)
-            return np.broadcast_to(s.dv(t, v, y), v.shape), np.broadcast_to(s.dy(t, v, y), y.shape)
-
-        return self._traced("rates", rates)
+    def _changes(self, tracer: Tracer, plan: engine.Plan, t: Any, h: Any, v: Any, y: Any) -> tuple[Any, Any]:
+        """By how much v and y change at their rates, with symbols."""
+        s = self._scaled_symbols(tracer, h)
+        return np.broadcast_to(s.dv(t, v, y), v.shape), np.broadcast_to(s.dy(t, v, y), y.shape)
 
     def _traced(self, what: str, blocks: Callable[..., tuple[Any, Any]]) -> tuple[Evaluated, list[Array]] | None:
         """Blocks as operations, with the values of their parameters; None if they have samples, or too many operations.

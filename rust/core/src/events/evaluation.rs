@@ -14,14 +14,34 @@ use crate::{
     step::cache::Cache,
     tape::{
         Id, Op, Tape,
+        real::{Precision, Real},
         split::{Body, Split},
     },
 };
 
+/// Numbers of which values are made, and the stages that have been made of them.
+pub trait Cached: Real {
+    /// The stage of a tape that is not cut.
+    fn stage(body: Body) -> Result<Arc<Stage<Self>>, Error>;
+}
+
+macro_rules! cached {
+    ($float:ident) => {
+        impl Cached for $float {
+            fn stage(body: Body) -> Result<Arc<Stage<$float>>, Error> {
+                static CACHE: LazyLock<Cache<Body, Stage<$float>>> = LazyLock::new(Cache::default);
+                let make = || Ok((Stage::new(Split { body: body.clone(), ..Split::default() }), body.ops.len()));
+                CACHE.find(&body, make)
+            }
+        }
+    };
+}
+cached!(f64);
+cached!(f32);
+
 /// Values with their kernels, which all that have the same operations share.
-#[derive(Clone)]
-pub struct Evaluation {
-    stage: Arc<Stage>,
+pub struct Evaluation<T: Real = f64> {
+    stage: Arc<Stage<T>>,
     states: usize,
     /// How many parameters there are; behind their rows stand those of samples.
     parameters: usize,
@@ -36,10 +56,17 @@ struct Samples {
     tables: Vec<u32>,
 }
 
-impl Evaluation {
-    /// Of values that depend on `states` numbers of the state, on parameters and on samples; none if they depend on a step or a time.
-    pub fn new(tape: &Tape, values: &[Id], states: usize) -> Result<Option<Evaluation>, Error> {
-        static CACHE: LazyLock<Cache<Body, Stage>> = LazyLock::new(Cache::default);
+impl<T: Real> Clone for Evaluation<T> {
+    fn clone(&self) -> Self {
+        let Evaluation { stage, states, parameters, samples } = self;
+        Evaluation { stage: Arc::clone(stage), states: *states, parameters: *parameters, samples: samples.clone() }
+    }
+}
+
+impl<T: Cached> Evaluation<T> {
+    /// Of values that depend on `states` numbers of the state, on parameters and on samples; none if they depend on a step or a time,
+    /// which of 32 bits are the first numbers of the state, or, of 32 bits, on samples.
+    pub fn new(tape: &Tape, values: &[Id], states: usize) -> Result<Option<Evaluation<T>>, Error> {
         let number = |op: &Op| if let Op::Param(i) = op { *i as usize + 1 } else { 0 };
         let parameters = tape.ops().iter().map(number).max().unwrap_or(0);
         let (body, looked_up) = Body::of_values(tape, values, states as u32, parameters as u32);
@@ -48,13 +75,14 @@ impl Evaluation {
         }
         let samples = if looked_up.is_empty() {
             None
+        } else if T::PRECISION == Precision::Single {
+            return Ok(None);
         } else {
             let (tables, times): (Vec<_>, Vec<_>) = looked_up.into_iter().unzip();
             let Some(times) = Evaluation::new(tape, &times, states)? else { return Ok(None) };
             Some(Arc::new(Samples { times, tables }))
         };
-        let make = || Ok((Stage::new(Split { body: body.clone(), ..Split::default() }), body.ops.len()));
-        Ok(Some(Evaluation { stage: CACHE.find(&body, make)?, states, parameters, samples }))
+        Ok(Some(Evaluation { stage: T::stage(body)?, states, parameters, samples }))
     }
 
     /// Whether they depend on samples: then [`Evaluator`] alone computes them.
@@ -66,7 +94,9 @@ impl Evaluation {
     pub fn values(&self) -> usize {
         self.stage.split.body.next.len()
     }
+}
 
+impl Evaluation {
     /// Computes the values of so many members, by rows, from rows of the state and of the parameters.
     pub fn run(&self, level: Level, (state, parameters): (&[Row], &[Row]), members: usize, values: &mut [f64]) {
         // A power of two, since kernels for fewer members than that are kept.
@@ -92,19 +122,19 @@ impl Evaluation {
 }
 
 /// The rows of a tile, to fill and to run.
-pub(crate) struct Filled {
-    compiled: Arc<CompiledStage>,
+pub(crate) struct Filled<T: Real = f64> {
+    compiled: Arc<CompiledStage<T>>,
     pub lanes: usize,
     states: usize,
-    rows: Aligned,
+    rows: Aligned<T>,
     /// A row for each value.
-    pub values: Aligned,
-    pool: Option<(KernelKind, Vec<f64>)>,
-    scratch: Vec<f64>,
+    pub values: Aligned<T>,
+    pool: Option<(KernelKind, Vec<T>)>,
+    scratch: Vec<T>,
 }
 
-impl Filled {
-    fn new(evaluation: &Evaluation, compiled: Arc<CompiledStage>) -> Filled {
+impl<T: Real> Filled<T> {
+    fn new(evaluation: &Evaluation<T>, compiled: Arc<CompiledStage<T>>) -> Filled<T> {
         let lanes = compiled.runner.lanes();
         let body = &evaluation.stage.split.body;
         let (rows, values) = (Aligned::new(body.rows * lanes), Aligned::new(body.next.len() * lanes));
@@ -112,12 +142,12 @@ impl Filled {
     }
 
     /// For rows of so many lanes.
-    pub(crate) fn of_lanes(evaluation: &Evaluation, level: Level, lanes: usize) -> Filled {
+    pub(crate) fn of_lanes(evaluation: &Evaluation<T>, level: Level, lanes: usize) -> Filled<T> {
         Filled::new(evaluation, evaluation.stage.compiled_for_lanes(level, lanes))
     }
 
     /// A row of the state or, behind these, of the parameters; of those that nothing depends on there may be none.
-    pub(crate) fn row(&mut self, i: usize) -> &mut [f64] {
+    pub(crate) fn row(&mut self, i: usize) -> &mut [T] {
         self.rows.chunks_exact_mut(self.lanes).nth(i).unwrap_or_default()
     }
 
@@ -135,7 +165,7 @@ impl Filled {
     pub(crate) fn prepare_lane(&mut self, parameters: &[Row], lane: usize, member: usize) {
         for (i, parameter) in parameters.iter().enumerate() {
             if let Some(number) = self.row(self.states + i).get_mut(lane) {
-                *number = parameter.at(member);
+                *number = T::of(parameter.at(member));
             }
         }
     }
@@ -153,13 +183,15 @@ impl Filled {
 }
 
 /// Values for any members, asked for again and again, some at a time.
-pub(crate) struct Evaluator<'a> {
-    evaluation: &'a Evaluation,
+pub(crate) struct Evaluator<'a, T: Real = f64> {
+    evaluation: &'a Evaluation<T>,
     parameters: &'a [Row<'a>],
     tables: &'a [Table<'a>],
     level: Level,
     /// For one or two members, and for many.
-    tiles: [Option<Filled>; 2],
+    tiles: [Option<Filled<T>>; 2],
+    /// The values of one member.
+    values: Vec<f64>,
     /// The times of samples.
     times: Option<Box<Evaluator<'a>>>,
 }
@@ -170,28 +202,28 @@ pub(super) const FEW: usize = 3;
 const MANY: usize = 64;
 
 /// A tile for about so many members, with the parameters that all have in common.
-fn tile_of<'t>(
-    tile: &'t mut Option<Filled>,
-    evaluation: &Evaluation,
+fn tile_of<'t, T: Real>(
+    tile: &'t mut Option<Filled<T>>,
+    evaluation: &Evaluation<T>,
     parameters: &[Row],
     level: Level,
     members: usize,
-) -> &'t mut Filled {
+) -> &'t mut Filled<T> {
     tile.get_or_insert_with(|| {
         let mut tile = Filled::new(evaluation, evaluation.stage.compiled(level, members));
         for (i, parameter) in parameters.iter().enumerate().filter(|(_, parameter)| parameter.is_common()) {
-            tile.row(evaluation.states + i).fill(parameter.at(0));
+            tile.row(evaluation.states + i).fill(T::of(parameter.at(0)));
         }
         tile
     })
 }
 
-impl<'a> Evaluator<'a> {
-    pub(crate) fn new(evaluation: &'a Evaluation, parameters: &'a [Row<'a>], tables: &'a [Table<'a>], level: Level) -> Self {
+impl<'a, T: Cached> Evaluator<'a, T> {
+    pub(crate) fn new(evaluation: &'a Evaluation<T>, parameters: &'a [Row<'a>], tables: &'a [Table<'a>], level: Level) -> Self {
         let parameters = &parameters[..evaluation.parameters.min(parameters.len())];
         let times =
             evaluation.samples.as_ref().map(|samples| Box::new(Evaluator::new(&samples.times, parameters, tables, level)));
-        Evaluator { evaluation, parameters, tables, level, tiles: [None, None], times }
+        Evaluator { evaluation, parameters, tables, level, tiles: [None, None], values: Vec::new(), times }
     }
 
     /// The samples of a member that hold at these times.
@@ -208,20 +240,19 @@ impl<'a> Evaluator<'a> {
         let tile = tile_of(&mut self.tiles[0], self.evaluation, self.parameters, self.level, 1);
         let lanes = tile.lanes;
         for (row, number) in state.iter().copied().flatten().take(read.min(n)).enumerate() {
-            tile.rows[row * lanes] = *number;
+            tile.rows[row * lanes] = T::of(*number);
         }
         for (row, parameter) in self.parameters.iter().enumerate().take(read.saturating_sub(n)) {
             if !parameter.is_common() {
-                tile.rows[(n + row) * lanes] = parameter.0[member];
+                tile.rows[(n + row) * lanes] = T::of(parameter.0[member]);
             }
         }
         let first = n + self.evaluation.parameters;
-        samples.iter().enumerate().for_each(|(i, sample)| tile.rows[(first + i) * lanes] = *sample);
+        samples.iter().enumerate().for_each(|(i, sample)| tile.rows[(first + i) * lanes] = T::of(*sample));
         tile.run();
-        if lanes > 1 {
-            (0..results).for_each(|i| tile.values[i] = tile.values[i * lanes]);
-        }
-        &tile.values[..results]
+        self.values.clear();
+        self.values.extend(tile.values.iter().step_by(lanes).take(results).map(|x| x.wide()));
+        &self.values
     }
 
     /// The values of each of these members, one after the other, from its numbers of the state, which follow each other likewise.
@@ -244,22 +275,22 @@ impl<'a> Evaluator<'a> {
             let given = &states[first * n..(first + some.len()) * n];
             for (row, numbers) in tile.rows.chunks_exact_mut(lanes).take(read.min(n)).enumerate() {
                 let last = given[(some.len() - 1) * n + row];
-                numbers.iter_mut().zip(given.chunks_exact(n)).for_each(|(to, state)| *to = state[row]);
-                numbers[some.len()..].fill(last);
+                numbers.iter_mut().zip(given.chunks_exact(n)).for_each(|(to, state)| *to = T::of(state[row]));
+                numbers[some.len()..].fill(T::of(last));
             }
             for (row, parameter) in own.clone() {
                 let numbers = tile.row(n + row);
-                numbers.iter_mut().zip(some).for_each(|(to, member)| *to = parameter.0[*member]);
-                numbers[some.len()..].fill(parameter.0[some[some.len() - 1]]);
+                numbers.iter_mut().zip(some).for_each(|(to, member)| *to = T::of(parameter.0[*member]));
+                numbers[some.len()..].fill(T::of(parameter.0[some[some.len() - 1]]));
             }
             for row in 0..looked_up {
                 let of_row = samples.iter().skip(first * looked_up + row).step_by(looked_up);
-                tile.row(n + evaluation.parameters + row).iter_mut().zip(of_row).for_each(|(to, sample)| *to = *sample);
+                tile.row(n + evaluation.parameters + row).iter_mut().zip(of_row).for_each(|(to, sample)| *to = T::of(*sample));
             }
             tile.run();
             let to = &mut values[first * results..(first + some.len()) * results];
             for (result, row) in tile.values.chunks_exact(lanes).enumerate() {
-                to.chunks_exact_mut(results).zip(row).for_each(|(to, number)| to[result] = *number);
+                to.chunks_exact_mut(results).zip(row).for_each(|(to, number)| to[result] = number.wide());
             }
         }
         values

@@ -9,4 +9,5 @@ pub(crate) mod resets;
 pub(crate) mod search;
 pub(crate) mod watch;
 
+pub(crate) use watch::any_may_change;
 pub use watch::{Brackets, locate};

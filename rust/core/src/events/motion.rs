@@ -3,7 +3,7 @@
 use std::{fmt, sync::Mutex};
 
 use super::{
-    evaluation::{Evaluation, Evaluator, Filled},
+    evaluation::{Cached, Evaluation, Evaluator, Filled},
     found::Found,
 };
 use smallvec::SmallVec;
@@ -11,25 +11,40 @@ use smallvec::SmallVec;
 use crate::{
     isa::Level,
     model::spec::{Row, Table},
+    tape::real::Real,
 };
 
 /// The slope of a quantity without derivative is its change over this share of a step, divided by the share.
 const SHORT: f64 = 1.0 / (1u64 << 26) as f64;
 
 /// Values and the parameters that they depend on, by rows.
-pub struct Values<'a> {
+pub struct Values<'a, T: Real = f64> {
     /// The values.
-    pub of: Evaluation,
+    pub of: Evaluation<T>,
     /// One number for all members, or one for each.
     pub parameters: Vec<Row<'a>>,
     /// The sampled inputs, if the values depend on such.
     pub tables: Vec<Table<'a>>,
 }
 
-impl Values<'_> {
-    fn evaluator(&self, level: Level) -> Evaluator<'_> {
+impl<T: Cached> Values<'_, T> {
+    fn evaluator(&self, level: Level) -> Evaluator<'_, T> {
         Evaluator::new(&self.of, &self.parameters, &self.tables, level)
     }
+}
+
+/// A step, of a time, a length and a state; of 32 bits its numbers are rounded to these.
+pub enum Trial<'a> {
+    /// Of 64 bits.
+    Double(Values<'a>),
+    /// Of 32.
+    Single(Values<'a, f32>),
+}
+
+/// What computes it.
+enum Trials<'a> {
+    Double(Evaluator<'a>),
+    Single(Evaluator<'a, f32>),
 }
 
 /// The times of an event that are known before a run, in the order of the motion, and the signs of its quantity before them.
@@ -98,8 +113,8 @@ pub struct Event<'a> {
 pub struct Events<'a> {
     /// The events.
     pub events: Vec<Event<'a>>,
-    /// A step, of a time, a length and a state.
-    pub step: Values<'a>,
+    /// A step of any length.
+    pub step: Trial<'a>,
     /// Whether the steps of the run are such steps, to the last bit; fused ones are not.
     pub repeats: bool,
     /// By how much a state changes in a step at its rates, of the same numbers.
@@ -160,7 +175,7 @@ pub(crate) struct At<'s> {
 /// Answers questions about the motion of any members.
 pub(crate) struct Motion<'a> {
     pub events: &'a Events<'a>,
-    step: Evaluator<'a>,
+    step: Trials<'a>,
     rates: Evaluator<'a>,
     quantities: Vec<(Evaluator<'a>, Option<Evaluator<'a>>)>,
     new_states: Vec<Option<Evaluator<'a>>>,
@@ -173,7 +188,10 @@ impl<'a> Motion<'a> {
             |event: &'a Event<'a>| (event.quantity.evaluator(level), event.slope.as_ref().map(|slope| slope.evaluator(level)));
         Motion {
             events,
-            step: events.step.evaluator(level),
+            step: match &events.step {
+                Trial::Double(values) => Trials::Double(values.evaluator(level)),
+                Trial::Single(values) => Trials::Single(values.evaluator(level)),
+            },
             rates: events.rates.evaluator(level),
             quantities: events.events.iter().map(of).collect(),
             new_states: events.events.iter().map(|event| Some(event.then.as_ref()?.evaluator(level))).collect(),
@@ -194,14 +212,20 @@ impl<'a> Motion<'a> {
     /// The states after steps of these lengths.
     pub(crate) fn steps(&mut self, from: &States, lengths: &[f64]) -> States {
         let inputs = self.with_lengths(from, lengths);
-        let numbers = self.step.run(&from.members, &inputs);
+        let numbers = match &mut self.step {
+            Trials::Double(step) => step.run(&from.members, &inputs),
+            Trials::Single(step) => step.run(&from.members, &inputs),
+        };
         let t = from.t.iter().zip(lengths).map(|(t, h)| t + h).collect();
         States { members: from.members.clone(), t, numbers }
     }
 
     /// The state after a step of this length.
     pub(crate) fn step(&mut self, At { member, t, state }: At, h: f64) -> &[f64] {
-        self.step.one(member, &[&[t, h], state])
+        match &mut self.step {
+            Trials::Double(step) => step.one(member, &[&[t, h], state]),
+            Trials::Single(step) => step.one(member, &[&[t, h], state]),
+        }
     }
 
     /// By how much the state would change in such a step at its rates.

@@ -16,7 +16,7 @@ const LOCATED_AT_ONCE: usize = 1 << 10;
 
 /// A whole step of a member.
 #[derive(Debug)]
-pub struct Step {
+pub(crate) struct Step {
     pub member: usize,
     /// Its number, or how many steps the member had taken before.
     pub number: i64,
@@ -86,7 +86,7 @@ pub(super) struct Located {
 }
 
 /// Where a member stops: in this step.
-pub struct Stop {
+pub(crate) struct Stop {
     pub step: Arc<Step>,
     pub t: f64,
     pub state: Numbers,
@@ -104,7 +104,7 @@ impl Stop {
 }
 
 /// The events of some members, by one thread.
-pub struct Watch<'a> {
+pub(crate) struct Watch<'a> {
     pub(crate) motion: Motion<'a>,
     pub(super) first: usize,
     pub(super) found: Found,
@@ -578,7 +578,14 @@ impl Events<'_> {
     }
 }
 
+/// Whether one of several quantities may do so, of which each stands in a row: one step before, and at both ends of a step.
+pub(crate) fn any_may_change([before, now, next]: [&[f64]; 3]) -> bool {
+    let all = before.iter().zip(now).zip(next);
+    all.fold(false, |any, ((before, now), next)| any | may_change(*before, *now, *next))
+}
+
 /// Whether g may change its sign between two states, once or twice: see `reference/events.py`.
+#[inline(always)]
 fn may_change(before: f64, g: f64, next: f64) -> bool {
     let bend = ((next - g) - (g - before)).abs();
     let bend = if before.is_nan() { f64::INFINITY } else { REACH * bend };

@@ -2,9 +2,9 @@
 
 pub(super) mod events;
 
-use std::{ops::Range, sync::Arc, time::Instant};
+use std::{sync::Arc, time::Instant};
 
-use self::events::{Looking, Looks, Stepped};
+use self::events::{Looks, Stepped};
 
 use super::{
     Model,
@@ -113,16 +113,8 @@ pub trait Steppable: Traceable {
         steps: f64,
     ) -> Result<Box<dyn Group<Self>>, Error>;
 
-    /// What looks for events in the steps of so many members from `first` on, in so many lanes, which may notice where one may be.
-    /// None where these are not of numbers of 64 bits, as quantities are.
-    fn looks<'l, 'a: 'l>(
-        _watch: &'l mut Watch<'a>,
-        _notices: bool,
-        _lanes: usize,
-        _members: Range<usize>,
-    ) -> Option<Box<dyn Looking<Self> + 'l>> {
-        None
-    }
+    /// Makes so many steps from the k-th on, and looks for events in them. Of each kind of number, so that this is compiled once.
+    fn look(looks: &mut Looks, on: &mut Stepped<Self>, k: i64, steps: i64);
 }
 
 impl Steppable for f64 {
@@ -137,13 +129,8 @@ impl Steppable for f64 {
         model.group(traced, machine, members, clock, steps)
     }
 
-    fn looks<'l, 'a: 'l>(
-        watch: &'l mut Watch<'a>,
-        notices: bool,
-        lanes: usize,
-        members: Range<usize>,
-    ) -> Option<Box<dyn Looking<f64> + 'l>> {
-        Some(Box::new(Looks::new(watch, notices, lanes, members.start, members.len())))
+    fn look(looks: &mut Looks, on: &mut Stepped<f64>, k: i64, steps: i64) {
+        looks.advance(on, k, steps);
     }
 }
 
@@ -157,6 +144,10 @@ impl Steppable for f32 {
         _steps: f64,
     ) -> Result<Box<dyn Group<f32>>, Error> {
         Ok(Box::new(Lanes::<f32>::new(traced, &model.spec, machine.level, members, clock)?))
+    }
+
+    fn look(looks: &mut Looks, on: &mut Stepped<f32>, k: i64, steps: i64) {
+        looks.advance(on, k, steps);
     }
 }
 
@@ -314,7 +305,7 @@ impl<'a, T: Steppable> Worker<'a, T> {
             let (part, checked) = (&mut part, plan.first);
             let notices = plan.model.key.signature.watched.is_some() && !group.tally().is_empty();
             let members = part.first + from..part.first + from + count;
-            let looks = watch.as_mut().and_then(|watch| T::looks(watch, notices, group.lanes(), members));
+            let looks = watch.as_mut().map(|watch| Looks::new(watch, notices, group.lanes(), members.start, members.len()));
             let mut job = Job { plan, carries, first_piece, group, part, from, count, good: &mut good, checked, looks };
             let ran = job.run(go_on);
             self.good = good;
@@ -339,10 +330,10 @@ struct Checks {
 }
 
 /// One group's run.
-struct Job<'a, 'b, 'w, T: Real> {
+struct Job<'a, 'b, 'w, 'e, T: Real> {
     plan: &'a FixedRun<'a>,
     /// Where events are looked for.
-    looks: Option<Box<dyn Looking<T> + 'w>>,
+    looks: Option<Looks<'w, 'e>>,
     /// The v slot holds something else than v between steps: finish before keeping it.
     carries: bool,
     /// How many steps until the first check.
@@ -381,7 +372,7 @@ fn put<T: Copy>(rows: &mut Columns<T>, at: usize, from: usize, count: usize, slo
     }
 }
 
-impl<T: Real> Job<'_, '_, '_, T> {
+impl<T: Steppable> Job<'_, '_, '_, '_, T> {
     /// Whether it ran to its end.
     fn run(&mut self, go_on: &mut dyn FnMut(u64) -> bool) -> bool {
         let (plan, lanes) = (self.plan, self.group.lanes());
@@ -455,13 +446,13 @@ impl<T: Real> Job<'_, '_, '_, T> {
         put(&mut self.part.tally, 0, self.from, self.count, self.group.tally(), lanes);
         if let Some(mut looks) = self.looks.take() {
             looks.end();
-            self.write_stops(&*looks);
+            self.write_stops(&looks);
         }
         true
     }
 
     /// Writes the states that events gave to members, and of those that stopped, for all later saved states, too.
-    fn write_stops(&mut self, looks: &dyn Looking<T>) {
+    fn write_stops(&mut self, looks: &Looks) {
         let plan = self.plan;
         for (lane, given) in looks.given().iter().enumerate() {
             for ([from, until], state) in given {
@@ -522,7 +513,7 @@ impl<T: Real> Job<'_, '_, '_, T> {
                     begin: [&self.plan.v, &self.plan.y],
                     group: &mut *self.group,
                 };
-                looks.advance(&mut on, k, n);
+                T::look(&mut looks, &mut on, k, n);
                 self.looks = Some(looks);
             }
         }

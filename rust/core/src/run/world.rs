@@ -7,7 +7,7 @@ use super::{
     Model,
     fixed::{
         Steppable, all_below,
-        events::{Looking, Looks, Stepped},
+        events::{Looks, Stepped},
         huge, kept, save,
     },
     workers::{self, GoOn, Workers},
@@ -500,7 +500,7 @@ impl World<f64> {
                 begin: [&[], &[]],
             };
             let mut looks = Looks::again(watch, between, &mut on, k, (state, begins, group));
-            looks.advance(&mut on, k, n);
+            <f64 as Steppable>::look(&mut looks, &mut on, k, n);
             given.extend(looks.pause(between, &mut on, (k + n, group)));
             if !carries {
                 share.store(v, y, members);

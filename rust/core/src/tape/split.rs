@@ -77,11 +77,13 @@ impl Body {
     }
 
     /// Values as the next state, of numbers that all are rows: first `states` ones of the state, then so many parameters, then
-    /// samples; of these the tables and the times.
+    /// samples; of these the tables and the times. Of float32 the time and the step are the first two of the state.
     pub(crate) fn of_values(tape: &Tape, values: &[Id], states: u32, parameters: u32) -> (Body, Vec<(u32, Id)>) {
-        let mut samples = Vec::new();
+        let (mut samples, is_single) = (Vec::new(), tape.precision() == Precision::Single);
         let mut body = Body::of(tape, values, &mut |id| match tape.op(id) {
-            Op::State(i) => Some(Op::Row(i)),
+            Op::Time if is_single => Some(Op::Row(0)),
+            Op::Step if is_single => Some(Op::Row(1)),
+            Op::State(i) => Some(Op::Row(if is_single { i + 2 } else { i })),
             Op::Param(i) => Some(Op::Row(states + i)),
             Op::Sample(table, t) => {
                 samples.push((table, t));

@@ -4,6 +4,7 @@ use std::{ops::Range, sync::Arc};
 
 use crate::{
     events::{
+        any_may_change,
         evaluation::Filled,
         motion::{Event, Events, Numbers},
         resets::{Followed, Memory},
@@ -11,7 +12,7 @@ use crate::{
     },
     group::Group,
     model::spec::{Row, Spec},
-    tape::real::Real,
+    tape::real::{Precision, Real},
 };
 
 /// So many steps are made at a time: their states stay in a cache.
@@ -27,7 +28,7 @@ const NOTICED_OF_GROUP: i64 = 1 << 11;
 const FEWER_AGAIN: usize = 2;
 
 /// The quantities of a group while it is stepped.
-pub(in crate::run) struct Looks<'w, 'a> {
+pub struct Looks<'w, 'a> {
     watch: &'w mut Watch<'a>,
     /// Of each event.
     tiles: Vec<Filled>,
@@ -229,7 +230,7 @@ impl<'w, 'a> Looks<'w, 'a> {
 }
 
 /// Fills a tile of a quantity with a time, so long after those of step 0, and a state, by rows of lanes.
-fn fill(tile: &mut Filled, (on, events): (&Stepped<f64>, &Events), state: &[f64], since: f64) {
+fn fill<T: Real>(tile: &mut Filled, (on, events): (&Stepped<T>, &Events), state: &[f64], since: f64) {
     tile.row(0).iter_mut().enumerate().for_each(|(lane, t)| {
         *t = events.sign * (events.begin.at(on.first + lane.min(on.count - 1)) + since);
     });
@@ -242,24 +243,6 @@ fn fill(tile: &mut Filled, (on, events): (&Stepped<f64>, &Events), state: &[f64]
 fn comes(events: &Events, member: usize, (k, n, h): (i64, i64, f64)) -> bool {
     let [t, t_end] = [k, k + n].map(|number| events.begin.at(member) + number as f64 * h);
     events.comes(member, t, t_end)
-}
-
-/// What looks for events in the steps of a group.
-pub trait Looking<T: Real> {
-    /// Where members stopped.
-    fn stops(&self) -> &[Option<Stop>];
-
-    /// States that events gave to members, of a method that carries something else than v: from one step on until before another.
-    fn given(&self) -> &[Vec<([i64; 2], Numbers)>];
-
-    /// Whether events change states: then steps cannot be made again without them.
-    fn changes(&self) -> bool;
-
-    /// Ends the run of these members.
-    fn end(&mut self);
-
-    /// Makes steps, and looks for events in them.
-    fn advance(&mut self, on: &mut Stepped<T>, k: i64, steps: i64);
 }
 
 /// A step of a lane in which an event may occur: its number among those that were made together, and the quantity at both ends.
@@ -296,29 +279,49 @@ impl<T: Real> Stepped<'_, T> {
     }
 }
 
-impl Looking<f64> for Looks<'_, '_> {
-    fn stops(&self) -> &[Option<Stop>] {
+/// Numbers behind others, with 64 bits.
+fn add<T: Real>(to: &mut Vec<f64>, numbers: &[T]) {
+    to.extend(numbers.iter().map(|x| x.wide()));
+}
+
+/// Numbers that were such ones, in their place.
+fn put<T: Real>(to: &mut [T], numbers: &[f64]) {
+    to.iter_mut().zip(numbers).for_each(|(to, x)| *to = T::of(*x));
+}
+
+impl Looks<'_, '_> {
+    /// Where members stopped.
+    pub(super) fn stops(&self) -> &[Option<Stop>] {
         &self.stops
     }
 
-    fn changes(&self) -> bool {
+    /// States that events gave to members, of a method that carries something else than v: from one step on until before another.
+    pub(super) fn given(&self) -> &[Vec<([i64; 2], Numbers)>] {
+        &self.given
+    }
+
+    /// Whether events change states: then steps cannot be made again without them.
+    pub(super) fn changes(&self) -> bool {
         !self.memories.is_empty()
     }
 
-    fn end(&mut self) {
+    /// Ends the run of these members.
+    pub(super) fn end(&mut self) {
         self.memories.iter().for_each(|memory| self.watch.end_member(memory));
     }
 
-    fn advance(&mut self, on: &mut Stepped<f64>, mut k: i64, steps: i64) {
+    /// Makes steps, and looks for events in them.
+    pub(in crate::run) fn advance<T: Real>(&mut self, on: &mut Stepped<T>, mut k: i64, steps: i64) {
         let until = k + steps;
-        if self.changes() && (on.carries || self.in_lanes) {
+        let repeats = T::PRECISION == Precision::Double && !self.in_lanes;
+        if self.changes() && (on.carries || !repeats) {
             return self.advance_together(on, k, until);
         }
         if self.changes() {
             return self.advance_with_changes(on, k, until);
         }
         while k < until && self.stops.iter().any(Option::is_none) {
-            let noticing = self.notices && self.begun;
+            let noticing = repeats && self.notices && self.begun;
             let most = if noticing {
                 self.together
             } else if self.notices {
@@ -338,21 +341,15 @@ impl Looking<f64> for Looks<'_, '_> {
         }
     }
 
-    fn given(&self) -> &[Vec<([i64; 2], Numbers)>] {
-        &self.given
-    }
-}
-
-impl Looks<'_, '_> {
     /// What is noticed begins with the quantities at the present state and one step before.
-    fn begin_to_notice(&mut self, on: &mut Stepped<f64>) {
+    fn begin_to_notice<T: Real>(&mut self, on: &mut Stepped<T>) {
         if !self.notices {
             return;
         }
         let (lanes, tally) = (on.group.lanes(), on.group.tally_mut());
         let first = tally.len() - (2 * self.now.len() + 1) * lanes;
         for (rows, (before, now)) in tally[first..].chunks_exact_mut(2 * lanes).zip(self.before.iter().zip(&self.now)) {
-            rows.iter_mut().zip(before.iter().chain(now)).for_each(|(to, number)| *to = *number);
+            rows.iter_mut().zip(before.iter().chain(now)).for_each(|(to, number)| *to = T::of(*number));
         }
     }
 
@@ -363,7 +360,7 @@ impl Looks<'_, '_> {
 
     /// Makes steps with events that change states, of a world or a method that carries something else than v: all lanes go on from the
     /// end of the first step in which one is changed, where what that one carries begins anew.
-    fn advance_together(&mut self, on: &mut Stepped<f64>, mut k: i64, until: i64) {
+    fn advance_together<T: Real>(&mut self, on: &mut Stepped<T>, mut k: i64, until: i64) {
         let (h, (p, _)) = (on.h, on.rows());
         while k < until && self.goes_on() {
             let n = (until - k).min(self.together) as usize;
@@ -378,8 +375,17 @@ impl Looks<'_, '_> {
             }
             self.find_quantities(on, k, n);
             let (mut made, mut changed) = (n, Vec::new());
+            // Where nothing happens in any lane, what is known of members is brought up to date later.
+            let (mut is_fresh, mut is_behind) = (true, false);
             for row in 0..n {
                 self.wake(on, k + row as i64, &mut changed);
+                if changed.is_empty() && row > 0 && !is_fresh && self.is_quiet(row, n) {
+                    is_behind = true;
+                    continue;
+                }
+                if std::mem::take(&mut is_behind) {
+                    self.catch_up(row, &changed);
+                }
                 if !changed.is_empty() {
                     made = row;
                     break;
@@ -396,6 +402,10 @@ impl Looks<'_, '_> {
                     made = row + 1;
                     break;
                 }
+                is_fresh = self.memories.iter().any(Memory::is_fresh);
+            }
+            if is_behind {
+                self.catch_up(made, &[]);
             }
             let [least, most] = NOTICED_AT_ONCE;
             self.together = if changed.is_empty() { (self.together * 2).min(most) } else { (self.together / 2).max(least) };
@@ -404,8 +414,36 @@ impl Looks<'_, '_> {
         }
     }
 
+    /// The quantity of an event in all lanes, in one of the states that are kept.
+    fn row_of(&self, row: usize, e: usize) -> &[f64] {
+        let (lanes, events) = (self.now[e].len(), self.tiles.len());
+        &self.values[(row * events + e) * lanes..][..lanes]
+    }
+
+    /// Whether no event may occur in one of so many steps, of which it is not the first, in any lane; all numbers are finite.
+    fn is_quiet(&self, row: usize, steps: usize) -> bool {
+        let block = self.states.len() / (steps + 1);
+        let may = |e: usize| any_may_change([row - 1, row, row + 1].map(|row| self.row_of(row, e)));
+        let are_finite = self.states[row * block..(row + 2) * block].iter().fold(true, |all, x| all & x.is_finite());
+        are_finite && !self.watch.motion.events.has_times() && !(0..self.tiles.len()).any(may)
+    }
+
+    /// Brings what is known of members, but of those that are at rest or were woken, to one of the states that are kept, not the
+    /// first, before which nothing happened to them.
+    fn catch_up(&mut self, row: usize, woken: &[(usize, Numbers)]) {
+        for lane in 0..self.memories.len() {
+            if self.memories[lane].rests() || woken.iter().any(|(other, _)| *other == lane) {
+                continue;
+            }
+            for e in 0..self.tiles.len() {
+                let [before, now] = [row - 1, row].map(|row| self.row_of(row, e)[lane]);
+                (self.memories[lane].before[e], self.memories[lane].now[e]) = (before, now);
+            }
+        }
+    }
+
     /// The quantities of all members in the states before each of some steps and after the last, by states, events and lanes.
-    fn find_quantities(&mut self, on: &Stepped<f64>, k: i64, steps: usize) {
+    fn find_quantities<T: Real>(&mut self, on: &Stepped<T>, k: i64, steps: usize) {
         let (lanes, events) = (on.group.lanes(), self.watch.motion.events);
         let block = self.states.len() / (steps + 1);
         self.values.clear();
@@ -425,7 +463,7 @@ impl Looks<'_, '_> {
     }
 
     /// Members at rest that their events let go in a step.
-    fn wake(&mut self, on: &Stepped<f64>, number: i64, changed: &mut Vec<(usize, Numbers)>) {
+    fn wake<T: Real>(&mut self, on: &Stepped<T>, number: i64, changed: &mut Vec<(usize, Numbers)>) {
         for (lane, memory) in self.memories.iter_mut().enumerate() {
             let Some(([_, until], state)) = self.given[lane].last_mut().filter(|_| memory.rests() && !memory.ended) else {
                 continue;
@@ -439,7 +477,7 @@ impl Looks<'_, '_> {
     }
 
     /// Whether no event may occur in a step of a lane, whose numbers are all finite; then its quantities go on.
-    fn passes(&mut self, on: &Stepped<f64>, number: i64, row: usize, lane: usize) -> bool {
+    fn passes<T: Real>(&mut self, on: &Stepped<T>, number: i64, row: usize, lane: usize) -> bool {
         let (lanes, events) = (on.group.lanes(), self.tiles.len());
         let (memory, of_run) = (&mut self.memories[lane], self.watch.motion.events);
         if self.stops[lane].is_some() || memory.rests() || memory.is_fresh() || on.first_bad[lane] >= 0 {
@@ -459,7 +497,13 @@ impl Looks<'_, '_> {
 
     /// Looks for events in a step of a lane, the `row`-th after the `k`-th, and notes the state that they give its member. After `until`
     /// steps it may be saved.
-    fn look_at(&mut self, on: &mut Stepped<f64>, [k, row, until]: [i64; 3], lane: usize, changed: &mut Vec<(usize, Numbers)>) {
+    fn look_at<T: Real>(
+        &mut self,
+        on: &mut Stepped<T>,
+        [k, row, until]: [i64; 3],
+        lane: usize,
+        changed: &mut Vec<(usize, Numbers)>,
+    ) {
         let (lanes, number, of_run, row) = (on.group.lanes(), k + row, self.watch.motion.events, row as usize);
         let (g, next) = (self.values_of(lanes, lane, row), self.values_of(lanes, lane, row + 1));
         let memory = &mut self.memories[lane];
@@ -496,7 +540,7 @@ impl Looks<'_, '_> {
     }
 
     /// Brings lanes to where they were after so many of the steps that were made, at step `k`, some of them in another state.
-    fn begin_anew(&mut self, on: &mut Stepped<f64>, k: i64, made: usize, changed: Vec<(usize, Numbers)>) {
+    fn begin_anew<T: Real>(&mut self, on: &mut Stepped<T>, k: i64, made: usize, changed: Vec<(usize, Numbers)>) {
         if changed.is_empty() {
             return;
         }
@@ -505,12 +549,12 @@ impl Looks<'_, '_> {
         let (old_v, old_y) = self.states[made * block..(made + 1) * block].split_at(p * lanes);
         let (v, y) = on.group.slots_mut();
         if !carries {
-            v.copy_from_slice(old_v);
+            put(v, old_v);
         }
-        y.copy_from_slice(old_y);
+        put(y, old_y);
         for (lane, state) in &changed {
             let slots = v.iter_mut().skip(*lane).step_by(lanes).chain(y.iter_mut().skip(*lane).step_by(lanes));
-            slots.zip(state).for_each(|(to, x)| *to = *x);
+            slots.zip(state).for_each(|(to, x)| *to = T::of(*x));
         }
         if !carries {
             return;
@@ -518,11 +562,15 @@ impl Looks<'_, '_> {
         on.group.start(k);
         let of_state = self.slots.len() / (self.states.len() / block);
         let mut carried = &self.slots[made * of_state..(made + 1) * of_state];
-        let mut restore = |slot: &mut [f64]| {
+        let mut restore = |slot: &mut [T]| {
             let (mine, others) = carried.split_at(slot.len());
             carried = others;
             for lane in (0..lanes).filter(|lane| !changed.iter().any(|(other, _)| other == lane)) {
-                slot.iter_mut().skip(lane).step_by(lanes).zip(mine.iter().skip(lane).step_by(lanes)).for_each(|(to, x)| *to = *x);
+                slot.iter_mut()
+                    .skip(lane)
+                    .step_by(lanes)
+                    .zip(mine.iter().skip(lane).step_by(lanes))
+                    .for_each(|(to, x)| *to = T::of(*x));
             }
         };
         restore(on.group.slots_mut().0);
@@ -530,14 +578,14 @@ impl Looks<'_, '_> {
     }
 
     /// Makes steps with events that change states: those of members at which nothing happens in the lanes, all others again.
-    fn advance_with_changes(&mut self, on: &mut Stepped<f64>, mut k: i64, until: i64) {
+    fn advance_with_changes<T: Real>(&mut self, on: &mut Stepped<T>, mut k: i64, until: i64) {
         let (lanes, events, h) = (on.group.lanes(), self.now.len(), on.h);
         while k < until && self.goes_on() {
             let n = (until - k).min(if self.begun { self.together } else { 1 });
             self.states.clear();
             let (v, y) = on.group.slots();
-            self.states.extend_from_slice(v);
-            self.states.extend_from_slice(y);
+            add(&mut self.states, v);
+            add(&mut self.states, y);
             let state_of = |states: &[f64], lane: usize| states.iter().skip(lane).step_by(lanes).copied().collect();
             if !self.begun {
                 for (lane, memory) in self.memories.iter_mut().enumerate() {
@@ -553,14 +601,15 @@ impl Looks<'_, '_> {
             let mut noticed = Vec::new();
             if self.notices {
                 let tally = on.group.tally_mut();
-                tally[first_row + rows..].fill(0.0);
-                noticed.extend_from_slice(&tally[first_row..first_row + rows]);
+                tally[first_row + rows..].fill(T::default());
+                add(&mut noticed, &tally[first_row..first_row + rows]);
                 on.group.advance(k, n);
             }
             let (v, y) = on.group.slots();
             let is_finite =
-                |lane: usize| [v, y].iter().all(|slot| slot.iter().skip(lane).step_by(lanes).all(|x| x.is_below(f64::INFINITY)));
-            let may = |lane: usize| !self.notices || on.group.tally()[first_row + rows + lane] != 0.0 || !is_finite(lane);
+                |lane: usize| [v, y].iter().all(|slot| slot.iter().skip(lane).step_by(lanes).all(|x| x.is_below(T::INFINITY)));
+            let may =
+                |lane: usize| !self.notices || on.group.tally()[first_row + rows + lane] != T::default() || !is_finite(lane);
             let is_followed = |lane: &usize| {
                 let (is_bad, memory) = (self.notices && on.first_bad[*lane] >= 0, &self.memories[*lane]);
                 let is_due = || may(*lane) || comes(self.watch.motion.events, memory.member, (k, n, h));
@@ -587,7 +636,7 @@ impl Looks<'_, '_> {
             for (lane, (state, first_bad, stop)) in places.iter().zip(results) {
                 let (v, y) = on.group.slots_mut();
                 let slots = v.iter_mut().skip(*lane).step_by(lanes).chain(y.iter_mut().skip(*lane).step_by(lanes));
-                slots.zip(state).for_each(|(to, x)| *to = x);
+                slots.zip(state).for_each(|(to, x)| *to = T::of(x));
                 on.first_bad[*lane] = first_bad.unwrap_or(-1);
                 self.stops[*lane] = stop;
             }
@@ -597,7 +646,7 @@ impl Looks<'_, '_> {
     }
 
     /// Chooses how many steps are made together, after so many of members have to be repeated.
-    fn choose_together(&mut self, again: usize, on: &Stepped<f64>) {
+    fn choose_together<T: Real>(&mut self, again: usize, on: &Stepped<T>) {
         let [least, most] = NOTICED_AT_ONCE;
         if again * FEWER_AGAIN > on.count {
             self.together = (self.together / 2).max(least);
@@ -607,7 +656,7 @@ impl Looks<'_, '_> {
     }
 
     /// What is noticed of these lanes goes on with the quantities that are remembered.
-    fn remember(&self, on: &mut Stepped<f64>, places: impl Iterator<Item = usize>) {
+    fn remember<T: Real>(&self, on: &mut Stepped<T>, places: impl Iterator<Item = usize>) {
         if !self.notices {
             return;
         }
@@ -617,28 +666,28 @@ impl Looks<'_, '_> {
         for lane in places {
             let memory = &self.memories[lane];
             for (e, (before, now)) in memory.before.iter().zip(&memory.now).enumerate() {
-                tally[first + 2 * e * lanes + lane] = *before;
-                tally[first + (2 * e + 1) * lanes + lane] = *now;
+                tally[first + 2 * e * lanes + lane] = T::of(*before);
+                tally[first + (2 * e + 1) * lanes + lane] = T::of(*now);
             }
         }
     }
 
     /// Makes steps that notice whether an event may occur in them.
-    fn make_and_notice(&mut self, on: &mut Stepped<f64>, k: i64, n: i64) {
+    fn make_and_notice<T: Real>(&mut self, on: &mut Stepped<T>, k: i64, n: i64) {
         let lanes = on.group.lanes();
         let rows = 2 * self.now.len() * lanes;
         let tally = on.group.tally_mut();
         let first_row = tally.len() - lanes - rows;
-        tally[first_row + rows..].fill(0.0);
+        tally[first_row + rows..].fill(T::default());
         self.states.clear();
-        self.states.extend_from_slice(&tally[first_row..first_row + rows]);
+        add(&mut self.states, &tally[first_row..first_row + rows]);
         let (v, y) = on.group.slots();
-        self.states.extend_from_slice(v);
-        self.states.extend_from_slice(y);
+        add(&mut self.states, v);
+        add(&mut self.states, y);
         on.group.advance(k, n);
         let (first, h, events) = (on.first, on.h, self.watch.motion.events);
         let may = &on.group.tally()[first_row + rows..];
-        let is_flagged = |lane: &usize| may[*lane] != 0.0 || comes(events, first + lane, (k, n, h));
+        let is_flagged = |lane: &usize| may[*lane] != T::default() || comes(events, first + lane, (k, n, h));
         let flagged: Vec<usize> = (0..on.count).filter(is_flagged).collect();
         self.choose_together(flagged.len() * n as usize, on);
         let mut noticed = Vec::new();
@@ -666,7 +715,7 @@ impl Looks<'_, '_> {
     }
 
     /// Makes steps and keeps the states before each and after the last.
-    fn make_steps(&mut self, on: &mut Stepped<f64>, k: i64, n: i64) {
+    fn make_steps<T: Real>(&mut self, on: &mut Stepped<T>, k: i64, n: i64) {
         self.states.clear();
         self.slots.clear();
         let spec = on.spec.filter(|_| !self.changes());
@@ -678,8 +727,8 @@ impl Looks<'_, '_> {
             if unrolled > 0 && at % steps == 0 && at + steps <= k + n {
                 let (v, y) = on.group.advance_unrolled(at).split_at(unrolled * p * lanes);
                 for step in 0..unrolled {
-                    self.states.extend_from_slice(&v[step * p * lanes..(step + 1) * p * lanes]);
-                    self.states.extend_from_slice(&y[step * q * lanes..(step + 1) * q * lanes]);
+                    add(&mut self.states, &v[step * p * lanes..(step + 1) * p * lanes]);
+                    add(&mut self.states, &y[step * q * lanes..(step + 1) * q * lanes]);
                 }
                 at += steps;
             } else {
@@ -691,26 +740,26 @@ impl Looks<'_, '_> {
         self.keep_state(on, k + n);
     }
 
-    fn keep_state(&mut self, on: &mut Stepped<f64>, k: i64) {
+    fn keep_state<T: Real>(&mut self, on: &mut Stepped<T>, k: i64) {
         if on.carries {
             self.carried.clear();
-            self.carried.extend_from_slice(on.group.slots().0);
+            add(&mut self.carried, on.group.slots().0);
             if self.changes() {
                 self.slots.extend_from_slice(&self.carried);
-                on.group.kept().into_iter().for_each(|block| self.slots.extend_from_slice(block));
+                on.group.kept().into_iter().for_each(|block| add(&mut self.slots, block));
             }
             on.group.finish(k);
         }
         let (v, y) = on.group.slots();
-        self.states.extend_from_slice(v);
-        self.states.extend_from_slice(y);
+        add(&mut self.states, v);
+        add(&mut self.states, y);
         if on.carries {
-            on.group.slots_mut().0.copy_from_slice(&self.carried);
+            put(on.group.slots_mut().0, &self.carried);
         }
     }
 
     /// Looks for events in the steps that were made.
-    fn look(&mut self, on: &mut Stepped<f64>, k: i64, steps: usize) {
+    fn look<T: Real>(&mut self, on: &mut Stepped<T>, k: i64, steps: usize) {
         let lanes = on.group.lanes();
         let (p, q) = on.rows();
         let block = (p + q) * lanes;
@@ -731,7 +780,8 @@ impl Looks<'_, '_> {
                     let begin = events.begin.at(member);
                     events.may_occur(event, member, quantities, [begin + before_it, begin + since])
                 };
-                if row > 0 && (0..lanes).fold(false, |any, lane| any | may(&lane)) {
+                let is_timed = events.events[event].times.is_some();
+                if row > 0 && (is_timed || any_may_change([before, now, g])) {
                     let flagged = (0..on.count).filter(may);
                     seen.extend(flagged.map(|lane| Seen { lane, row: row - 1, event, g: [now[lane], g[lane]] }));
                 }
