@@ -116,7 +116,7 @@ def sought(search: Collected, new_states: dict[int, NewState] | None = None, jum
         if of_value is None or (then is not None and of_then is None):
             return None
         events.append(OfCore(times, of_value, of_slope, of_then, float(event.direction), int(event.terminal), event.most))
-    tables = engine.model(plan).tables if search.trials.has_samples else []
+    tables = search.trials.tables
     both = [_values(*each, tables) for each in (step, rates)]
     if both[0] is None or both[1] is None:
         return None

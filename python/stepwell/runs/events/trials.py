@@ -91,6 +91,11 @@ class Trials:
             return self._single_of_core(what)
         return self._traced_step() if what == "step" else self._traced_rates()
 
+    @property
+    def tables(self) -> list[Any]:
+        """The sampled inputs of what is traced: of each the start, the interval, and a row for each sample."""
+        return self._model.tables if self.has_samples else []
+
     def _single_of_core(self, what: str) -> tuple[Evaluated, list[Array]] | None:
         """The same of float32, whose rates are those of float64; not of a method that carries or keeps something."""
         plan, control = self._everyone, self._plan.system.control
@@ -169,14 +174,14 @@ class Trials:
         What has the same structure has the same operations, which are traced once. A step that the core does not make by one
         tape, as of many bodies, is not traced at all: that would take seconds.
         """
-        plan, key = self._everyone, None
+        key = None
         if self._by_core:
             if self._number is None:
                 return None
-            key = (self._number, what, plan.choice)
+            key = (self._number, what, self._plan.choice)
             if key in TRACED:
                 return TRACED[key], self._numbers
-        tracer = self._tracer()
+        plan, tracer = self._everyone, self._tracer()
         leaves = map(tracer.tape.state, count())
         t, h = next(leaves), next(leaves)
         v, y = (_symbols(shape, leaves) for shape in (plan.system.v_shape, plan.system.y_shape))
@@ -200,11 +205,15 @@ class Trials:
     @cached_property
     def _number(self) -> int | None:
         """The number of the tape of a step, the same for all plans with it; None if it is not one tape."""
-        plan = self._everyone
-        model, choice = engine.model(plan), 0 if self._adaptive else plan.choice
+        plan, model = self._plan, self._model
+        choice = 0 if self._adaptive else plan.choice
         if _core.in_parts(model, plan.members, choice=choice, attempts=self._adaptive) is not None:
             return None
         return _core.tape_number(model, choice=choice, attempts=self._adaptive)
+
+    @cached_property
+    def _model(self) -> _core.ModelSpec:
+        return engine.model(self._plan)
 
     def _tracer(self) -> Tracer:
         # Attempts of fused steps fuse what the rates say; steps of one length are made again without.
@@ -213,7 +222,10 @@ class Trials:
 
     @cached_property
     def _numbers(self) -> list[Array]:
-        """The values of the parameters of what was traced before."""
+        """The values of the parameters of what was traced before, whose order is that of the rows of the model."""
+        if not isinstance(self._plan.t0, np.ndarray) and self._plan.lengths is None:
+            self.has_samples = bool(self._model.tables)
+            return [row for rows in self._model.rows for row in rows]
         tracer = self._tracer()
         self._scaled_symbols(tracer, tracer.tape.state(1))
         self.has_samples = bool(tracer.tables)
