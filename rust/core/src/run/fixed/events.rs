@@ -18,11 +18,14 @@ use crate::{
 /// So many steps are made at a time: their states stay in a cache.
 const STEPS_AT_ONCE: i64 = 64;
 
+/// Where all lanes go on from the first step in which one is changed, so many are made at a time, at least and at most.
+const MADE_AT_ONCE: [i64; 2] = [4, 256];
+
 /// Where the steps notice what may occur, so many are made at a time, at first and at least and at most; and no more than so many
 /// of all members of a group, beside which what is read of them is little.
 const NOTICED_AT_FIRST: i64 = 16;
 const NOTICED_AT_ONCE: [i64; 2] = [4, 64];
-const NOTICED_OF_GROUP: i64 = 1 << 11;
+const NOTICED_OF_GROUP: i64 = 1 << 13;
 /// If more than one step for so many members would be repeated, half as many are made at a time; if less than a fourth of it, twice
 /// as many.
 const FEWER_AGAIN: usize = 2;
@@ -407,7 +410,7 @@ impl Looks<'_, '_> {
             if is_behind {
                 self.catch_up(made, &[]);
             }
-            let [least, most] = NOTICED_AT_ONCE;
+            let [least, most] = MADE_AT_ONCE;
             self.together = if changed.is_empty() { (self.together * 2).min(most) } else { (self.together / 2).max(least) };
             k += made as i64;
             self.begin_anew(on, k, made, changed);
@@ -610,9 +613,10 @@ impl Looks<'_, '_> {
                 |lane: usize| [v, y].iter().all(|slot| slot.iter().skip(lane).step_by(lanes).all(|x| x.is_below(T::INFINITY)));
             let may =
                 |lane: usize| !self.notices || on.group.tally()[first_row + rows + lane] != T::default() || !is_finite(lane);
+            let has_times = self.watch.motion.events.has_times();
             let is_followed = |lane: &usize| {
                 let (is_bad, memory) = (self.notices && on.first_bad[*lane] >= 0, &self.memories[*lane]);
-                let is_due = || may(*lane) || comes(self.watch.motion.events, memory.member, (k, n, h));
+                let is_due = || may(*lane) || (has_times && comes(self.watch.motion.events, memory.member, (k, n, h)));
                 self.stops[*lane].is_none() && !is_bad && (memory.is_special() || is_due())
             };
             let places: Vec<usize> = (0..on.count).filter(is_followed).collect();
@@ -686,8 +690,8 @@ impl Looks<'_, '_> {
         add(&mut self.states, y);
         on.group.advance(k, n);
         let (first, h, events) = (on.first, on.h, self.watch.motion.events);
-        let may = &on.group.tally()[first_row + rows..];
-        let is_flagged = |lane: &usize| may[*lane] != T::default() || comes(events, first + lane, (k, n, h));
+        let (may, has_times) = (&on.group.tally()[first_row + rows..], events.has_times());
+        let is_flagged = |lane: &usize| may[*lane] != T::default() || (has_times && comes(events, first + lane, (k, n, h)));
         let flagged: Vec<usize> = (0..on.count).filter(is_flagged).collect();
         self.choose_together(flagged.len() * n as usize, on);
         let mut noticed = Vec::new();
