@@ -85,7 +85,7 @@ impl<T: Cached> Evaluation<T> {
         Ok(Some(Evaluation { stage: T::stage(body)?, states, parameters, samples }))
     }
 
-    /// Whether they depend on samples: then [`Evaluator`] alone computes them.
+    /// Whether they depend on samples: then an `Evaluator` alone computes them.
     pub fn has_samples(&self) -> bool {
         self.samples.is_some()
     }
