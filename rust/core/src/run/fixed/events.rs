@@ -25,7 +25,7 @@ const MADE_AT_ONCE: [i64; 2] = [4, 256];
 /// of all members of a group, beside which what is read of them is little.
 const NOTICED_AT_FIRST: i64 = 16;
 const NOTICED_AT_ONCE: [i64; 2] = [4, 64];
-const NOTICED_OF_GROUP: i64 = 1 << 13;
+const NOTICED_OF_GROUP: i64 = 1 << 11;
 /// If more than one step for so many members would be repeated, half as many are made at a time; if less than a fourth of it, twice
 /// as many.
 const FEWER_AGAIN: usize = 2;
