@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import stepwell as sw
 from stepwell import _core
-from stepwell.runs import engine, recent
+from stepwell.runs import engine, short_runs
 from stepwell.scenes.builtin.arenstorf import MU
 
 from .compare.chosen.orbits import arenstorf
@@ -62,7 +62,7 @@ def stages(members: int) -> dict[str, float]:
         return made
 
     def call(steps: int) -> sw.Run:
-        recent._recent.clear()  # as at the first call: later ones are in the table of short runs
+        short_runs._kept.clear()  # as at the first call: later ones are in the table of short runs
         return sw.integrate(system, method, v=v, y=y, dt=0.01, steps=steps, threads=1)
 
     within: dict[int, float] = {}
@@ -105,7 +105,7 @@ def adaptive_stages(name: str) -> dict[str, float]:
         return made
 
     def call(end: float) -> sw.Run:
-        recent._recent.clear()
+        short_runs._kept.clear()
         return sw.integrate(system, method, v=v, y=y, tolerance=TOLERANCE, at=[end], threads=1)
 
     within, around = {0.0: 1e12, one.end: 1e12}, 1e12

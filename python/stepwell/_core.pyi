@@ -117,8 +117,18 @@ class ModelSpec:
 class Prepared:
     """A run of fixed steps without its start."""
 
-    def run(self, v: object, y: object, saved_v: NDArray[Any], saved_y: NDArray[Any], carry: NDArray[Any] | None) -> int:
+    def run(
+        self,
+        v: object,
+        y: object,
+        saved_v: NDArray[Any],
+        saved_y: NDArray[Any],
+        carry: NDArray[Any] | None,
+        parameters: list[NDArray[np.float64]] | None = None,
+    ) -> int:
         """Make the run from a start, fill the saved states and what the method carries, and say what is known of it.
+
+        ``parameters`` are others of the same shapes, for this run and those to come.
 
         0: nothing was made, since the start is not of floats of the prepared shapes, or a number was not finite, or another
         thread makes the run now. 2: it is certain that no member has grown much. 1: neither.
@@ -137,8 +147,11 @@ class PreparedAdaptive:
         last_v: NDArray[np.float64],
         last_y: NDArray[np.float64],
         paces: NDArray[np.float64],
+        parameters: list[NDArray[np.float64]] | None = None,
     ) -> int:
         """Make the run from a start and fill the saved states, and those at the end with their step-size controllers.
+
+        ``parameters`` are others of the same shapes, for this run.
 
         0: nothing was made, since the start is not of floats of the prepared shapes, or a member did not come to its end, or it
         takes long, or another thread makes the run now. 2: what the motion keeps has not changed much, and no amount became

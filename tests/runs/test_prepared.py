@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import pytest
 import stepwell as sw
-from stepwell.runs import recent as module
+from stepwell.runs import short_runs as module
 from support.cases import number
 from support.families import family
 from support.heard import heard
@@ -33,7 +33,7 @@ DT = {"dt": 0.05, "steps": 20}
 @pytest.fixture(autouse=True)
 def nothing_recent() -> None:
     """No test knows the runs of another."""
-    module._recent.clear()
+    module._kept.clear()
 
 
 def assert_same(run: sw.Run, other: sw.Run) -> None:
@@ -52,7 +52,7 @@ def assert_same(run: sw.Run, other: sw.Run) -> None:
 
 def whole(*arguments: Any, **options: Any) -> sw.Run:
     """What ``integrate`` makes without anything that it kept."""
-    module._recent.clear()
+    module._kept.clear()
     return sw.integrate(*arguments, **options)
 
 
@@ -301,7 +301,7 @@ def test_threads_may_call_it_at_once() -> None:
 
 def test_threads_may_call_integrate_at_once() -> None:
     """More runs than are kept, of systems that are made anew."""
-    ask, omegas = {"v": 0.0, "y": 1.0, "dt": 0.1, "steps": 3}, 1.0 + np.arange(2 * module.MOST_RECENT)
+    ask, omegas = {"v": 0.0, "y": 1.0, "dt": 0.1, "steps": 3}, 1.0 + np.arange(2 * module.MOST_KEPT)
     expected = [whole(sw.Oscillator(omega), "rk4", **ask).y.tobytes() for omega in omegas]
 
     def work(_: int) -> None:
@@ -309,7 +309,7 @@ def test_threads_may_call_integrate_at_once() -> None:
             assert [sw.integrate(sw.Oscillator(omega), "rk4", **ask).y.tobytes() for omega in omegas] == expected
 
     in_threads(work)
-    assert len(module._recent) <= module.MOST_RECENT + 8
+    assert len(module._kept) <= module.MOST_KEPT + 8
 
 
 @pytest.mark.parametrize("dtype", ["float32", "float64"])
@@ -407,6 +407,120 @@ def test_integrate_knows_a_system_by_its_parameters(monkeypatch: pytest.MonkeyPa
             assert_same(sw.integrate(make(0.5), "rk4", **arguments), expected[-1])
 
 
+#: Systems by one number that reaches the step as it is, and a start.
+OTHER_NUMBERS: dict[str, tuple[Any, dict[str, Any]]] = {
+    "own": (lambda x: duffing(beta=x), {"v": 0.1, "y": 1.0}),
+    "own, with an invariant": (lambda x: lotka_volterra(a=x), {"y": np.array([1.0, 2.0])}),
+    "own, of members": (lambda x: lorenz(rho=x * np.linspace(0.5, 2.0, 7)), {"y": np.ones((3, 7))}),
+    "own, an axis of its own": (lambda x: top(inertia=x * np.array([[1.0, 2.0], [2.0, 2.0], [3.0, 4.0]])),
+                                {"v": np.ones((3, 2)), "y": np.ones((4, 2))}),
+    "built-in": (lambda x: sw.Oscillator(x), {"v": 0, "y": [1.0, 2.0]}),
+    "with samples": (lambda x: sw.Oscillator(x, a=sw.Sampled(np.linspace(0.0, 1.0, 40), interval=0.1)), {"v": 0.1, "y": 1.0}),
+    "damping that may be none": (lambda x: sw.Pendulum(2.0, damping=x - 1.0), {"v": 0.1, "y": 1.0}),
+}  # fmt: skip
+WAYS: list[tuple[str, dict[str, Any]]] = [
+    ("rk4", DT), ("false_euler", {**DT, "every": 3}), ("leapfrog", DT), ("rk4", {**DT, "dtype": "float32"}),
+    ("rk4", {**DT, "fused": True}), ("dop853", {"tolerance": 1e-7, "at": [0.5, 1.5]}),
+    ("taylor", {"tolerance": 1e-9, "at": 1.5}), ("rodas5p", {"tolerance": 1e-6, "at": 2.0}),
+]  # fmt: skip
+
+
+def test_other_numbers_of_a_system_take_the_short_way(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The runs, findings and systems are those of a call that knows nothing; only the first two calls make a request."""
+    for (kind, (make, start)), (method, options) in itertools.product(OTHER_NUMBERS.items(), WAYS):
+        # Rates that depend on velocities, or have none; and a series does not see that samples change.
+        if (method == "leapfrog" and kind not in ("built-in", "with samples")) or (kind, method) == ("with samples", "taylor"):
+            continue
+        numbers = (1.0, 1.5, 0.75, 1.0, 1.25)
+        if kind == "damping that may be none" and "tolerance" in options:
+            numbers = (1.5, 1.25, 1.75)  # undamped ones are judged by their energy, by the long way
+        expected = [whole(make(x), method, **start, **options) for x in numbers]
+        module._kept.clear()
+        sw.integrate(make(2.0), method, **start, **options)
+        sw.integrate(make(1.75), method, **start, **options)
+        with monkeypatch.context() as patched:
+            patched.setattr("stepwell.runs.request.Request.of", None)
+            for x, run in zip(numbers, expected, strict=True):
+                system = make(x)
+                got = sw.integrate(system, method, **start, **options)
+                assert_same(got, run)
+                assert repr(got.system) == repr(system), kind
+    assert len({run.y.tobytes() for run in expected}) == len(set(numbers))
+
+
+def test_other_numbers_are_checked_and_judged() -> None:
+    """What depends on numbers beside the steps goes the long way: errors, switches of the time, warnings, an energy to keep."""
+
+    @sw.system
+    def switched(t: Any, v: Any, y: Any, *, at: Any = 0.5) -> Any:
+        return np.where(t < at, 1.0, -1.0) - y
+
+    for at in (0.5, 0.3, 0.7, 0.45):
+        run = sw.integrate(switched(at=at), "dop853", v=0.0, y=1.0, tolerance=1e-8, at=1.0)
+        assert_same(run, whole(switched(at=at), "dop853", v=0.0, y=1.0, tolerance=1e-8, at=1.0))
+    for damping in (0.5, 0.25, 0.0, 0.125, 0.0):
+        arguments: dict[str, Any] = {"v": 0.0, "y": 1.0, "tolerance": 1e-6, "at": 5.0}
+        assert_same(
+            sw.integrate(sw.Pendulum(2.0, damping=damping), "merson", **arguments),
+            whole(sw.Pendulum(2.0, damping=damping), "merson", **arguments),
+        )
+    said = []
+    for omega in (1.0, 1.5, 30.0, 1.25, 31.0):
+        run, warned = with_warnings(lambda omega=omega: sw.integrate(sw.Oscillator(omega), "rk4", v=0.0, y=1.0, dt=0.1, steps=40))
+        again, anew = with_warnings(lambda omega=omega: whole(sw.Oscillator(omega), "rk4", v=0.0, y=1.0, dt=0.1, steps=40))
+        assert_same(run, again)
+        assert warned == anew
+        said.append(len(warned))
+    assert said == [0, 0, 1, 0, 1]
+    for beta in (1.0, 2.0, 3.0):
+        sw.integrate(duffing(beta=beta), "rk4", v=0.0, y=1.0, dtype="float32", **DT)
+    refused(sw.errors.ArgumentError, "beta", sw.integrate, duffing(beta=1e39), "rk4", v=0.0, y=1.0, dtype="float32", **DT)
+    refused(sw.errors.ArgumentError, "y: ", sw.integrate, duffing(beta=1.5), "rk4", v=0.0, y=math.nan, **DT)
+
+
+STIFFNESS = 1.0
+
+
+def test_a_function_that_reads_something_else_is_another_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Globals, what is captured, defaults by keyword, code and declared invariants may change between two calls."""
+    captured = 1.0
+
+    @sw.system
+    def sprung(t: Any, v: Any, y: Any, *, k: Any = 1.0) -> Any:
+        return -STIFFNESS * captured * scaled() * k * y
+
+    def scaled(*, by: float = 1.0) -> float:
+        return by
+
+    def end(k: float) -> float:
+        return float(sw.integrate(sprung(k=k), "rk4", v=0.0, y=1.0, dt=0.1, steps=3).y[-1])
+
+    def expected(strength: float) -> float:
+        return float(whole(sw.Oscillator(np.sqrt(strength)), "rk4", v=0.0, y=1.0, dt=0.1, steps=3).y[-1])
+
+    def all_right(strength: float) -> None:
+        for k in (1.0, 2.0, 3.0):
+            assert end(k) == pytest.approx(expected(strength * k), rel=1e-12)
+
+    all_right(1.0)
+    monkeypatch.setitem(globals(), "STIFFNESS", 2.0)
+    all_right(2.0)
+    captured = 1.5
+    all_right(3.0)
+    assert scaled.__kwdefaults__ is not None
+    scaled.__kwdefaults__["by"] = 2.0
+    all_right(6.0)
+    scaled.__code__ = (lambda *, by: 3.0 * by).__code__
+    all_right(18.0)
+
+    @sprung.invariant
+    def energy(v: Any, y: Any, *, k: Any) -> Any:
+        return 0.5 * v**2 + 0.5 * k * y**2
+
+    run = sw.integrate(sprung(k=1.0), "rk4", v=0.0, y=1.0, dt=0.1, steps=3, record="energy")
+    assert run.recorded["energy"].shape == (1,)
+
+
 STRENGTH = [1.0]
 
 
@@ -432,7 +546,7 @@ def test_integrate_notices_another_level(monkeypatch: pytest.MonkeyPatch) -> Non
         monkeypatch.setenv("STEPWELL_KERNELS", level)
         for _ in range(3):
             sw.integrate(system, "rk4", v=0.0, y=1.0, dt=0.1, steps=3)
-    assert len(module._recent) == len(sw.isa_levels())
+    assert len(module._kept) == len(sw.isa_levels())
     monkeypatch.setenv("STEPWELL_KERNELS", "mmx")
     refused(sw.errors.ArgumentError, "mmx", sw.integrate, system, "rk4", v=0.0, y=1.0, dt=0.1, steps=3)
 
@@ -443,11 +557,11 @@ def test_integrate_keeps_little_memory() -> None:
     for system in systems:
         for _ in range(3):
             sw.integrate(system, "rk4", v=0.0, y=1.0, dt=0.01, steps=3)
-    assert len(module._recent) <= module.MOST_RECENT
+    assert len(module._kept) <= module.MOST_KEPT
     large = sw.Oscillator(np.ones(100_000))
     for _ in range(3):
         sw.integrate(large, "rk4", v=0.0, y=1.0, dt=0.01, steps=3)
-    assert all(each.run is None or each.run._system is not large for each in module._recent.values())
+    assert all(each.run is None or each.run.system is not large for each in module._kept.values())
     small, start = sw.Oscillator(), np.ones(100_000)
     for _ in range(3):
         sw.integrate(small, "rk4", v=0.0, y=start, dt=0.01, steps=3)
@@ -455,4 +569,4 @@ def test_integrate_keeps_little_memory() -> None:
     kept, start = weakref.ref(start), None  # type: ignore[assignment]
     gc.collect()
     assert kept() is None
-    assert all(each.run is None or each.run._short is None for each in module._recent.values() if each.system() is small)
+    assert all(each.run is None for each in module._kept.values() if each.system() is small)

@@ -21,7 +21,7 @@ import numpy as np
 import stepwell as sw
 from stepwell.base.immutable import changed
 from stepwell.model.around import Part
-from stepwell.runs.recent import _recent
+from stepwell.runs.short_runs import _kept
 
 #: Options of a run that a world has, too, and those that a piece of a run is given again.
 OF_A_WORLD = ("dt", "t0", "start_step", "start", "control", "force", "fused", "dtype", "events")
@@ -75,7 +75,7 @@ class Asked:
 
     def make(self, **more: Any) -> sw.Run:
         """The run with these options in place of its own; nothing that the package remembers of others is used."""
-        _recent.clear()
+        _kept.clear()
         options = {name: each for name, each in (self.options | more).items() if each is not None}
         return sw.integrate(self.system, self.method, **options)
 

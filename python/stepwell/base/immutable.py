@@ -209,11 +209,14 @@ def frozen(name: str, array: Any) -> Any:
 
     A read-only view does not suffice, because its base may still be written to.
     """
-    owner = array
-    while isinstance(owner.base, np.ndarray):
-        owner = owner.base
-    if not array.flags.writeable and not owner.flags.writeable and (owner.base is None or type(owner.base) is bytes):
-        return array
+    if not array.flags.writeable:
+        if array.base is None:
+            return array
+        owner = array
+        while isinstance(owner.base, np.ndarray):
+            owner = owner.base
+        if not owner.flags.writeable and (owner.base is None or type(owner.base) is bytes):
+            return array
     if array.nbytes > LARGE and 0 not in array.strides:
         from .checks import fits  # which needs this module
 
@@ -232,10 +235,12 @@ class FixedDict(dict[str, Any]):
     """A dictionary that cannot be changed, and whose arrays are read-only."""
 
     def __init__(self, items: dict[str, Any]) -> None:
-        items = dict(items)
-        aligned(items)
-        read_only(items)
         super().__init__(items)
+        for name, value in items.items():
+            if isinstance(value, np.ndarray):
+                dict.__setitem__(self, name, frozen(name, value if value.flags.aligned else value.copy()))
+            elif type(value) is dict and not name.startswith("_"):
+                dict.__setitem__(self, name, FixedDict(value))
 
     def _refuse(self, *_: Any, **__: Any) -> Any:
         raise FixedError("parameters: those of a system cannot be assigned; make another system, with what is to change")

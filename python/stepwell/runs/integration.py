@@ -12,9 +12,9 @@ from ..model.systems import System
 from .findings import is_heard, warn_of
 from .making import noticing
 from .options import Options
-from .recent import recent
 from .request import Request
 from .result import Run
+from .short_runs import short_run
 
 if TYPE_CHECKING:
     from ..base.literals import Backend, RunForm
@@ -185,8 +185,9 @@ def integrate(
         v, y, dt, steps, every, tolerance, at, control, force, None if record is NOTHING else record, events, form, fused, dtype,
         t0, start, max_steps, max_step, jumps, positive, progress, threads, backend, device, start_step, resume,
     )  # fmt: skip
-    prepared = recent(system, method, options)
-    run = noticing(Request.of(system, method, options), is_heard) if prepared is None else prepared.run_of(system, v, y)
+    run = short_run(system, method, options)
+    if run is None:
+        run = noticing(Request.of(system, method, options), is_heard)
     if run.findings:
         warn_of(run.findings, 3)
     return run

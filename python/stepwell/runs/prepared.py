@@ -2,28 +2,26 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from .. import _core
 from ..base import checks
-from ..base.arrays import Shape
+from ..base.arrays import Array, Shape
 from ..base.immutable import frozen
 from ..errors import ArgumentError
 from ..model.methods import Method
 from ..model.systems import NBody, System
 from . import engine
-from .diagnostics import findings_of, finds_growth_only
+from .diagnostics import finds_growth_only
 from .findings import is_heard, may_have_amounts, warn_of
 from .fixed import fixed_run
 from .making import noticing
-from .options import Options, block_like, spread
+from .options import Options, spread
 from .request import Request
 from .result import Run
-
-if TYPE_CHECKING:
-    from .prepared_adaptive import ShortAdaptiveRun
+from .short import NOT_MADE, TAME, ShortRun
 
 #: The most bytes of what is kept for later runs: the parameters of a system, and start and saved states of a run.
 MOST_BYTES = 1 << 17
@@ -43,7 +41,7 @@ class PreparedRun:
         #: The last small request that was checked as a whole, with the shapes of its blocks in the call; None if others would not
         #: be the same but for the start.
         self._request: tuple[Request, tuple[Shape, Shape]] | None = None
-        self._short: _ShortRun | ShortAdaptiveRun | None = None
+        self._short: ShortRun | None = None
 
     def __repr__(self) -> str:
         """Of one line."""
@@ -84,20 +82,13 @@ class PreparedRun:
             return noticing(request, is_heard)
         return noticing(self.request(v, y), is_heard)
 
-    def run_of(self, system: System, v: Any, y: Any) -> Run:
-        """``run`` of a system that is equal to the prepared one."""
-        run = self.run(v, y)
-        if run.system is self._system:
-            run.system = system
-        return run
-
     def request(self, v: Any, y: Any) -> Request:
         """The request from this start, checked as a whole, after which others of these shapes are checked in less time."""
         request = Request.of(self._system, self._method, self._options._replace(v=v, y=y))
         if _is_free(request) and _is_small(request):
             shapes = (request.v.shape if v is None else np.shape(v)), np.shape(y)
             if self._request is None or self._request[1] != shapes:
-                self._short = _short_run(request, shapes)
+                self._short = _short_run(self._system, request, shapes)
             self._request = request, shapes
         return request
 
@@ -150,11 +141,12 @@ def _own(name: str, option: Any) -> Any:
     return option
 
 
-class _ShortRun:
-    """A run of so few steps that all else takes longer, without its start."""
+class ShortFixedRun(ShortRun):
+    """One with fixed steps."""
 
-    def __init__(self, request: Request, core: _core.Prepared) -> None:
-        self.request, self.core, plan = request, core, request.plan
+    def __init__(self, system: System, request: Request, core: _core.Prepared) -> None:
+        super().__init__(system, request)
+        self.core, plan = core, request.plan
         run = fixed_run(request)
         #: All attributes of a run that do not depend on the start.
         self.attributes = vars(run)
@@ -166,12 +158,11 @@ class _ShortRun:
         self.is_plain = finds_growth_only(request.system, plan.method, plan.steps)
         self.has_amounts = may_have_amounts(request.system)
 
-    def run(self, v: Any, y: Any) -> Run | None:
-        """The run from this start; None if it is to be made as any other."""
+    def _made(self, v: Any, y: Any, system: System, numbers: list[Array] | None) -> Run | None:
         dtype = self.dtype
         saved_v, saved_y = np.empty(self.shapes[0], dtype), np.empty(self.shapes[1], dtype)
         carry = None if self.shape_of_carry is None else np.empty(self.shape_of_carry, dtype)
-        outcome = self.core.run(v, y, saved_v, saved_y, carry)
+        outcome = self.core.run(v, y, saved_v, saved_y, carry, numbers)
         if outcome == NOT_MADE:
             return None
         run = object.__new__(Run)
@@ -179,18 +170,11 @@ class _ShortRun:
         attributes.update(self.attributes)
         attributes.update(
             t=self.t.copy(), v=saved_v, y=saved_y, status=self.status.copy(), first_bad_step=self.first_bad.copy(), carry=carry,
-            recorded={}, events={},
+            recorded={}, events={}, system=system,
         )  # fmt: skip
         if outcome != TAME or not self.is_plain or (self.has_amounts and (saved_y[-1] < 0.0).any()):
-            request = self.request
-            request = request._replace(v=block_like(v, request.v), y=block_like(y, request.y))
-            if findings := findings_of(run, request, is_heard):
-                run.findings = findings
+            self._findings(run, v, y, system)
         return run
-
-
-#: What the core says of a short run: it was not made; or it is certain that no member has grown.
-NOT_MADE, TAME = 0, 2
 
 
 def _is_free(request: Request) -> bool:
@@ -224,7 +208,15 @@ def _from(request: Request, shapes: tuple[Shape, Shape], v: Any, y: Any) -> Requ
     return request._replace(v=v, y=y, step_control=control)
 
 
-def _short_run(request: Request, shapes: tuple[Shape, Shape]) -> _ShortRun | ShortAdaptiveRun | None:
+def short_run_of(system: System, method: str | Method, options: Options) -> ShortRun | None:
+    """The run without its start and the numbers of its system; None if it is not known to be short, or keeps more of a start."""
+    request = Request.of(system, method, options)
+    if not (_is_free(request) and _is_small(request)):
+        return None
+    return _short_run(system, request, (request.v.shape if options.v is None else np.shape(options.v), np.shape(options.y)))
+
+
+def _short_run(system: System, request: Request, shapes: tuple[Shape, Shape]) -> ShortRun | None:
     """What the run is without its start; None if that is not known to be short."""
     plan = request.plan
     asks_for_more = plan.record or request.record or request.events is not None or request.progress
@@ -238,8 +230,8 @@ def _short_run(request: Request, shapes: tuple[Shape, Shape]) -> _ShortRun | Sho
     if request.step_control is not None:
         from .prepared_adaptive import short_adaptive_run  # only such runs need it
 
-        return short_adaptive_run(request, shapes)
+        return short_adaptive_run(system, request, shapes)
     if isinstance(request.system, NBody):
         return None
     core = _core.prepared(engine.model(plan), plan, plan.members, list(map(list, shapes)))
-    return None if core is None else _ShortRun(request, core)
+    return None if core is None else ShortFixedRun(system, request, core)

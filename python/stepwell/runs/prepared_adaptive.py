@@ -8,31 +8,28 @@ from typing import Any
 import numpy as np
 
 from .. import _core
-from ..base.arrays import Shape
+from ..base.arrays import Array, Shape
 from ..base.immutable import changed
 from ..model.methods import method
 from ..model.systems import NBody, System
 from . import engine, known_energy
 from .adaptive import of_extra_steps, paces_of, run_of
-from .diagnostics import findings_of
-from .findings import is_heard
-from .options import block_like
 from .request import Request
 from .result import AdaptiveState, Run
+from .short import NOT_MADE, TAME, ShortRun
 from .tolerance import lost_in_tolerance
 
-#: What the core says of a run: it was not made; or nothing that it checks can be found of it.
-NOT_MADE, TAME = 0, 2
 
+class ShortAdaptiveRun(ShortRun):
+    """One with adaptive steps."""
 
-class ShortAdaptiveRun:
-    """A run of so few adaptive steps that all else takes longer, without its start."""
-
-    def __init__(self, request: Request, core: _core.PreparedAdaptive, is_plain: bool) -> None:
+    def __init__(self, system: System, request: Request, core: _core.PreparedAdaptive, is_plain: bool) -> None:
+        super().__init__(system, request)
         plan, control = request.plan, request.step_control
         assert control is not None
         times, shape_of_paces = len(control.times), (engine.pace_numbers(plan), *plan.batch)
-        self.request, self.core = request, core
+        self.core = core
+        self.keeps_energy = known_energy.keeps_energy(request.system, None)
         self.shapes = (times, *request.v.shape), (times, *request.y.shape), request.v.shape, request.y.shape, shape_of_paces
         self.evaluations = engine.evaluations_of_attempt(plan)
         self.of_extra = of_extra_steps(plan, self.evaluations, dense=times > 1 or not control.pacing.begins)
@@ -43,12 +40,12 @@ class ShortAdaptiveRun:
         #: All attributes of a run, of which most do not depend on the start.
         self.attributes: dict[str, Any] = {}
 
-    def begin(self, v: Any, y: Any) -> bool:
+    def begin(self, v: Any, y: Any, numbers: list[Array] | None) -> bool:
         """Make the run once, to know all attributes, from this start; returns whether it was made."""
         plan, control = self.request.plan, self.request.step_control
         assert control is not None
         saved_v, saved_y, last_v, last_y, paces = map(np.empty, self.shapes)
-        if self.core.run(v, y, saved_v, saved_y, last_v, last_y, paces) == NOT_MADE:
+        if self.core.run(v, y, saved_v, saved_y, last_v, last_y, paces, numbers) == NOT_MADE:
             return False
         out = engine.Adapted(saved_v, saved_y, last_v, last_y, paces, np.zeros(plan.batch, np.int64), self.evaluations)
         run = run_of(self.request, out, control.times, saved_v, saved_y)
@@ -58,12 +55,13 @@ class ShortAdaptiveRun:
         self.attributes = vars(run)  # last, since another thread goes on from here as soon as there are some
         return True
 
-    def run(self, v: Any, y: Any) -> Run | None:
-        """The run from this start; None if it is to be made as any other."""
-        if not self.attributes and not self.begin(v, y):
+    def _made(self, v: Any, y: Any, system: System, numbers: list[Array] | None) -> Run | None:
+        if known_energy.keeps_energy(system, None) != self.keeps_energy:  # damping may be zero in one of them
+            return None
+        if not self.attributes and not self.begin(v, y, numbers):
             return None
         saved_v, saved_y, last_v, last_y, pace = map(np.empty, self.shapes)
-        outcome = self.core.run(v, y, saved_v, saved_y, last_v, last_y, pace)
+        outcome = self.core.run(v, y, saved_v, saved_y, last_v, last_y, pace, numbers)
         if outcome == NOT_MADE:
             return None
         request = self.request
@@ -75,16 +73,15 @@ class ShortAdaptiveRun:
         attributes.update(
             t=self.t.copy(), v=saved_v, y=saved_y, status=self.status.copy(), first_bad_step=self.first_bad_step.copy(),
             paces=paces, controller_state=AdaptiveState(last_v, last_y, pace, *self.last), recorded={}, events={},
+            system=system,
         )  # fmt: skip
         is_tame = outcome == TAME and self.is_plain
         if not is_tame or (self.groups is not None and lost_in_tolerance(pace, self.groups).any()):
-            start = block_like(v, request.v), block_like(y, request.y)
-            if findings := findings_of(run, request._replace(v=start[0], y=start[1]), is_heard):
-                run.findings = findings
+            self._findings(run, v, y, system)
         return run
 
 
-def short_adaptive_run(request: Request, shapes: tuple[Shape, Shape]) -> ShortAdaptiveRun | None:
+def short_adaptive_run(own: System, request: Request, shapes: tuple[Shape, Shape]) -> ShortAdaptiveRun | None:
     """What the run is without its start; None if it cannot be prepared."""
     plan, control, system = request.plan, request.step_control, request.system
     assert control is not None
@@ -109,4 +106,4 @@ def short_adaptive_run(request: Request, shapes: tuple[Shape, Shape]) -> ShortAd
     if core is None:
         return None
     is_plain = names is not None and not isinstance(system, NBody) and type(system).doubt is System.doubt
-    return ShortAdaptiveRun(request, core, is_plain)
+    return ShortAdaptiveRun(own, request, core, is_plain)

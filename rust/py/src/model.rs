@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use numpy::{PyArray2, PyArrayMethods, PyReadonlyArray2, PyUntypedArrayMethods};
+use numpy::{PyArray2, PyArrayDyn, PyArrayMethods, PyReadonlyArray2, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::{
     prelude::*,
     types::{PyBytes, PyString, PyTuple, PyType},
@@ -151,6 +151,8 @@ pub struct ModelSpec {
 
 /// The parameters, borrowed for a run.
 pub(crate) type Rows<'py> = Vec<PyReadonlyArray2<'py, f64>>;
+/// Other parameters in place of these, borrowed for a run, each with how many numbers its rows have.
+pub(crate) type Others<'py> = Vec<(usize, PyReadonlyArrayDyn<'py, f64>)>;
 /// The tables, borrowed for a run: start, interval, samples.
 pub(crate) type Tables<'py> = Vec<(f64, f64, PyReadonlyArray2<'py, f64>)>;
 
@@ -265,6 +267,31 @@ impl ModelSpec {
         self.rows.iter().map(|r| readable(r.bind(py))).collect()
     }
 
+    /// Borrows other parameters; none if they are not as many numbers, one after the other in memory.
+    pub fn others<'py>(&self, py: Python<'py>, arrays: &[Bound<'py, PyArrayDyn<f64>>]) -> PyResult<Option<Others<'py>>> {
+        if arrays.len() != self.rows.len() {
+            return Ok(None);
+        }
+        let mut others = Vec::with_capacity(arrays.len());
+        for (array, own) in arrays.iter().zip(&self.rows) {
+            let own = own.bind(py);
+            if array.len() != own.len() || !array.is_c_contiguous() {
+                return Ok(None);
+            }
+            others.push((own.shape()[1].max(1), array.try_readonly().map_err(in_use)?));
+        }
+        Ok(Some(others))
+    }
+
+    /// The system with other parameters.
+    pub fn with<'a>(&self, others: &'a Others<'_>, tables: &'a Tables<'_>) -> PyResult<Spec<'a>> {
+        let mut rows = Vec::new();
+        for (width, numbers) in others {
+            rows.extend(numbers.as_slice()?.chunks_exact(*width).map(Row));
+        }
+        Ok(Spec { signature: self.signature.clone(), rows, tables: self::tables(tables)? })
+    }
+
     /// Borrows the tables.
     pub fn tables<'py>(&self, py: Python<'py>) -> PyResult<Tables<'py>> {
         self.tables.iter().map(|(start, interval, t)| Ok((*start, *interval, readable(t.bind(py))?))).collect()
@@ -291,17 +318,23 @@ impl ModelSpec {
         }
     }
 
-    /// What the core steps.
-    pub fn model<'a>(&'a self, how: StepKind, rows: &'a Rows<'_>, tables: &'a Tables<'_>) -> PyResult<Model<'a>> {
+    /// The system.
+    pub fn spec<'a>(&self, rows: &'a Rows<'_>, tables: &'a Tables<'_>) -> PyResult<Spec<'a>> {
         let mut all = Vec::new();
         rows.iter().try_for_each(|array| add_rows(array, &mut all))?;
-        let spec = Spec { signature: self.signature.clone(), rows: all, tables: self::tables(tables)? };
+        Ok(Spec { signature: self.signature.clone(), rows: all, tables: self::tables(tables)? })
+    }
+
+    /// What the core steps.
+    pub fn model<'a>(&'a self, how: StepKind, rows: &'a Rows<'_>, tables: &'a Tables<'_>) -> PyResult<Model<'a>> {
+        Ok(self.of(how, self.spec(rows, tables)?))
+    }
+
+    /// What the core steps, of a system with parameters.
+    pub fn of<'a>(&self, how: StepKind, spec: Spec<'a>) -> Model<'a> {
         let Self { signature, record, fused, precision, .. } = self;
         // The matrix form says itself which products are fused, whatever they are made of.
         let fused = *fused && !matches!(how, StepKind::Matrix { .. });
-        Ok(Model {
-            spec,
-            key: TapeKey { signature: signature.clone(), how, record: record.clone(), fused, precision: *precision },
-        })
+        Model { spec, key: TapeKey { signature: signature.clone(), how, record: record.clone(), fused, precision: *precision } }
     }
 }

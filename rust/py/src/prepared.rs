@@ -34,6 +34,7 @@ const LEAST_SQUARE: f64 = 1e-270;
 /// A run of fixed steps without all that does not depend on the start.
 #[pyclass(module = "stepwell._core", frozen)]
 pub struct Prepared {
+    model: Py<ModelSpec>,
     run: Mutex<Kinds>,
     steps: RunSteps,
     /// The shapes of both blocks of a start.
@@ -57,20 +58,21 @@ struct Run<T> {
 #[pyfunction]
 pub(crate) fn prepared(
     py: Python<'_>,
-    model: &ModelSpec,
+    model: Bound<'_, ModelSpec>,
     plan: PlanOf,
     members: usize,
     shapes: [Vec<usize>; 2],
 ) -> PyResult<Option<Prepared>> {
-    let (rows, tables) = (model.rows(py)?, model.tables(py)?);
-    let precision = model.precision;
-    let model = model.model(model.started(plan.choice), &rows, &tables)?;
+    let spec = model.get();
+    let (rows, tables) = (spec.rows(py)?, spec.tables(py)?);
+    let precision = spec.precision;
+    let stepped = spec.model(spec.started(plan.choice), &rows, &tables)?;
     let clock = Clock { t0: plan.t0, h: plan.dt };
     let steps = RunSteps { first: plan.first, steps: plan.steps, every: plan.every };
     let is_short;
     macro_rules! of {
         ($kind:ident) => {{
-            let world = World::new(&model, clock, machine()?, members, plan.first).map_err(core_error)?;
+            let world = World::new(&stepped, clock, machine()?, members, plan.first).map_err(core_error)?;
             let sizes = world.sizes();
             let work = (sizes.0 + sizes.1) as f64 * plan.steps as f64;
             let most_steps = world.steps_between_checks().map_or(0, |steps| MOST_CHECKS * steps);
@@ -85,14 +87,18 @@ pub(crate) fn prepared(
         Precision::Double => of!(Double),
         Precision::Single => of!(Single),
     };
-    Ok(Some(Prepared { run: Mutex::new(run), steps, shapes, is_short }))
+    drop(stepped);
+    Ok(Some(Prepared { model: model.unbind(), run: Mutex::new(run), steps, shapes, is_short }))
 }
 
 #[pymethods]
 impl Prepared {
     /// Makes the run from this start and fills the saved states and what the method carries. Returns 0 if nothing was made, since
     /// the start is not of floats of these shapes, or a number was not finite, or another thread makes the run just now; 2 if it
-    /// is certain that no member has grown much; 1 otherwise.
+    /// is certain that no member has grown much; 1 otherwise. `parameters` are others of the same shapes, for this run and those
+    /// to come.
+    #[pyo3(signature = (v, y, saved_v, saved_y, carry, parameters=None))]
+    #[allow(clippy::too_many_arguments, reason = "in Python they have names")]
     fn run(
         &self,
         py: Python<'_>,
@@ -101,8 +107,19 @@ impl Prepared {
         saved_v: &Bound<'_, PyAny>,
         saved_y: &Bound<'_, PyAny>,
         carry: Option<&Bound<'_, PyAny>>,
+        parameters: Option<Vec<Bound<'_, PyArrayDyn<f64>>>>,
     ) -> PyResult<u8> {
         let Ok(mut run) = self.run.try_lock() else { return Ok(0) };
+        if let Some(parameters) = parameters {
+            let model = self.model.bind(py).get();
+            let Some(others) = model.others(py, &parameters)? else { return Ok(0) };
+            let tables = model.tables(py)?;
+            let spec = model.with(&others, &tables)?;
+            match &mut *run {
+                Kinds::Double(run) => run.world.renew(&spec),
+                Kinds::Single(run) => run.world.renew(&spec),
+            }
+        }
         match &mut *run {
             Kinds::Double(run) => self.with(py, run, [v, y], saved_v.extract()?, saved_y.extract()?, carry),
             Kinds::Single(run) => self.with(py, run, [v, y], saved_v.extract()?, saved_y.extract()?, carry),

@@ -2,7 +2,7 @@
 
 use std::sync::Mutex;
 
-use numpy::{PyReadonlyArray2, PyReadwriteArrayDyn};
+use numpy::{PyArrayDyn, PyReadonlyArray2, PyReadwriteArrayDyn};
 use pyo3::prelude::*;
 use stepwell_core::{
     model::spec::Row,
@@ -41,8 +41,8 @@ pub struct PreparedAdaptive {
 /// What is kept from run to run.
 struct Kept {
     lanes: adaptive::Prepared,
-    /// What computes the quantities that the true motion keeps, if there are some.
-    quantities: Option<World>,
+    /// What computes the quantities that the true motion keeps, if there are some, and its parameters.
+    quantities: Option<(World, Py<ModelSpec>)>,
     input: Input,
     state: Vec<f64>,
     status: Vec<i64>,
@@ -131,7 +131,10 @@ pub(crate) fn prepared_adaptive(
         Some(of) => {
             let (rows, tables) = (of.get().rows(py)?, of.get().tables(py)?);
             let model = of.get().model(of.get().started(0), &rows, &tables)?;
-            Some(World::new(&model, Clock { t0: 0.0, h: 1.0 }, machine()?, members, 0).map_err(core_error)?)
+            let world = World::new(&model, Clock { t0: 0.0, h: 1.0 }, machine()?, members, 0).map_err(core_error)?;
+            drop(model);
+            drop((rows, tables));
+            Some((world, of.unbind()))
         }
     };
     let input = Input {
@@ -160,6 +163,8 @@ impl PreparedAdaptive {
     /// Makes the run from this start and fills the states at the times of the pacing, those at the end and the paces there. Returns 0
     /// if nothing was made, since the start is not of floats of these shapes, or a member did not come to its end, or it takes
     /// long, or another thread makes the run just now; 2 if it is certain that nothing can be said of it; 1 otherwise.
+    /// `parameters` are others of the same shapes, for this run.
+    #[pyo3(signature = (v, y, saved_v, saved_y, last_v, last_y, paces, parameters=None))]
     #[allow(clippy::too_many_arguments, reason = "in Python they have names")]
     fn run(
         &self,
@@ -171,6 +176,7 @@ impl PreparedAdaptive {
         mut last_v: PyReadwriteArrayDyn<'_, f64>,
         mut last_y: PyReadwriteArrayDyn<'_, f64>,
         mut paces: PyReadwriteArrayDyn<'_, f64>,
+        parameters: Option<Vec<Bound<'_, PyArrayDyn<f64>>>>,
     ) -> PyResult<u8> {
         let Ok(mut kept) = self.kept.try_lock() else { return Ok(0) };
         let Kept { lanes, quantities, input, state, status, is_long } = &mut *kept;
@@ -179,7 +185,18 @@ impl PreparedAdaptive {
         }
         let model = self.model.bind(py).get();
         let (rows, tables) = (model.rows(py)?, model.tables(py)?);
-        let run = input.run(model.model(model.attempts(), &rows, &tables)?);
+        let others = match &parameters {
+            None => None,
+            Some(parameters) => match model.others(py, parameters)? {
+                None => return Ok(0),
+                others => others,
+            },
+        };
+        let spec = others.as_ref().map_or_else(|| model.spec(&rows, &tables), |others| model.with(others, &tables))?;
+        if others.is_some() && !lanes.renew(&spec) {
+            return Ok(0);
+        }
+        let run = input.run(model.of(model.attempts(), spec));
         let (saved_v, saved_y, paces) = (saved_v.as_slice_mut()?, saved_y.as_slice_mut()?, paces.as_slice_mut()?);
         let to_fill = adaptive::Arrays {
             saved_v: &mut *saved_v,
@@ -205,7 +222,13 @@ impl PreparedAdaptive {
             return Ok(1);
         }
         let last = |saved: &[f64], length: usize| saved.len() - length;
-        let is_kept = quantities.as_mut().is_none_or(|quantities| {
+        if let (Some((world, of)), Some(parameters)) = (quantities.as_mut(), &parameters) {
+            let of = of.bind(py).get();
+            let Some(others) = of.others(py, parameters)? else { return Ok(1) };
+            let tables = of.tables(py)?;
+            world.renew(&of.with(&others, &tables)?);
+        }
+        let is_kept = quantities.as_mut().is_none_or(|(quantities, _)| {
             let first = quantities.recorded(&input.v.numbers, &input.y.numbers);
             let end = [&saved_v[last(saved_v, end_v.len())..], &saved_y[last(saved_y, end_y.len())..]];
             let change = |(first, last): (&f64, &f64)| (last - first).abs() <= LITTLE * first.abs().max(last.abs());

@@ -19,10 +19,27 @@ from .by_name import reduced
 from .friction import Friction, FrictionOf, friction, place_of
 from .invariants import Invariant, invariant
 from .mass import MassMatrix, mass_matrix
+from .recognised import Reading, Unknown, reading
 
 #: The numbers whose size the error of an adaptive step is relative to.
 Scale = Literal["component", "row", "block"]
 SCALES = get_args(Scale)
+
+
+class Known:
+    """What follows from the functions of a definition, as long as they compute the same.
+
+    Attributes:
+        readings: what the functions read.
+        by_shapes: systems of which the operations are known, by the shapes of parameters and of states.
+    """
+
+    def __init__(self, readings: list[Reading]) -> None:
+        self.readings, self.by_shapes = readings, {}  # type: list[Reading], dict[Any, Any]
+
+    def holds(self, number: int) -> bool:
+        """Whether these are the functions, so many, and they read the same objects."""
+        return len(self.readings) == number and all(each.holds() for each in self.readings)
 
 
 class Definition:
@@ -61,6 +78,22 @@ class Definition:
         self.own_axes = {name: 0 if _changes(default) else np.ndim(default) for name, default in self.parameters.items()}
         self.invariants: dict[str, Invariant] = {}
         self.stick_friction: Friction | None = None
+        self._known = Known([])
+
+    def known(self) -> Known | None:
+        """What is known of its functions, the same object as long as these compute the same; None if that cannot be seen."""
+        known = self._known
+        if known.holds(1 + len(self.invariants)):
+            return known
+        try:
+            readings = [reading(self.function), *(reading(each.function) for each in self.invariants.values())]
+        except Unknown:
+            return None
+        if [each.identity for each in readings] == [each.identity for each in known.readings]:
+            known.readings = readings
+        else:
+            self._known = Known(readings)
+        return self._known
 
     @property
     def has_v(self) -> bool:

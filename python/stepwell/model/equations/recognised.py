@@ -11,8 +11,9 @@ from __future__ import annotations
 import dis
 import math
 from functools import lru_cache, partial
-from types import BuiltinFunctionType, CodeType, FunctionType, ModuleType
+from types import BuiltinFunctionType, CellType, CodeType, FunctionType, ModuleType
 from typing import Any
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -29,13 +30,73 @@ class Unknown(Exception):  # noqa: N818 (not an error: the function is traced)
     """Something that a function reads may change unseen."""
 
 
+class Reading:
+    """What a function reads, and its identity, which holds as long as it reads the very same objects.
+
+    That is seen in a microsecond; to find the identity anew takes some tens of them.
+    """
+
+    def __init__(self) -> None:
+        self.identity: Any = None
+        #: All functions among what is read, each with its code and its defaults.
+        self.functions: list[FunctionType] = []
+        self.defaults: list[tuple[CodeType, Any, Any]] = []
+        #: Dictionaries with a name and the object under it, and captured variables with their objects.
+        self.names: list[tuple[dict[str, Any], str, Any]] = []
+        self.cells: list[tuple[CellType, Any]] = []
+        #: Whether none of the objects can be changed in place.
+        self.is_fixed = True
+
+    def holds(self) -> bool:
+        """Whether the function still reads the same objects, none of which can be changed in place."""
+        if not self.is_fixed:
+            return False
+        for names, name, value in self.names:
+            if names.get(name, _MISSING) is not value:
+                return False
+        for function, known in zip(self.functions, self.defaults, strict=True):
+            code, defaults, keywords = known
+            if function.__code__ is not code or function.__defaults__ is not defaults or function.__kwdefaults__ is not keywords:
+                return False
+            if function.__dict__:
+                return False
+        try:
+            return all(cell.cell_contents is value for cell, value in self.cells)
+        except ValueError:  # an empty cell
+            return False
+
+
+_MISSING = object()
+#: What functions read that were recognised before, and the most of them.
+_READ: WeakKeyDictionary[FunctionType, Reading] = WeakKeyDictionary()
+MOST_READ = 1024
+
+
 def identity(function: Any) -> Any:
-    """A value that is equal for functions that compute the same.
+    """A value that is equal for functions that compute the same; the very same object while a function reads the same objects.
 
     Raises:
         Unknown: if something that the function reads may change unseen.
     """
-    return _of(function, [])
+    return reading(function).identity
+
+
+def reading(function: Any) -> Reading:
+    """What a function reads, with its identity.
+
+    Raises:
+        Unknown: if something that the function reads may change unseen.
+    """
+    known = _READ.get(function) if type(function) is FunctionType else None
+    if known is not None and known.holds():
+        return known
+    anew = Reading()
+    anew.identity = _of(function, anew)
+    if type(function) is FunctionType:
+        if len(_READ) >= MOST_READ:
+            _READ.clear()
+        _READ[function] = anew
+    return anew
 
 
 @lru_cache(maxsize=1024)
@@ -53,52 +114,67 @@ def _names(code: CodeType) -> tuple[str, ...]:
     return tuple(sorted(names))
 
 
-def _of(value: Any, seen: list[Any]) -> Any:
+def _of(value: Any, reading: Reading) -> Any:
     kind = type(value)
     if kind is float:
         return value.hex()
     if value is None or kind in (int, bool, str, bytes):
         return kind, value
     if kind is FunctionType:
-        return _of_function(value, seen)
-    if kind is np.ndarray and value.dtype.kind in "biuf" and value.nbytes <= MOST_BYTES:
-        return value.dtype.str, value.shape, value.tobytes()
+        return _of_function(value, reading)
     if isinstance(value, np.generic) and value.dtype.kind in "biuf":
         return value.dtype.str, value.tobytes()
-    if kind in (tuple, list) and len(value) <= MOST_ITEMS:
-        return kind, *(_of(each, seen) for each in value)
-    if kind is dict and len(value) <= MOST_ITEMS:
-        return kind, *((_of(key, seen), _of(each, seen)) for key, each in value.items())
-    if kind is partial:
-        return kind, *(_of(each, seen) for each in (value.func, value.args, value.keywords))
+    if kind is tuple and len(value) <= MOST_ITEMS:
+        return kind, *(_of(each, reading) for each in value)
     if isinstance(value, (BuiltinFunctionType, np.ufunc)) or any(value is each for each in MODULES):
         return id(value)
     # NumPy's functions that are written in Python or dispatch to other types.
     if getattr(value, "__module__", "").partition(".")[0] == "numpy" and callable(value) and not isinstance(value, type):
         return id(value)
+    reading.is_fixed = False
+    if kind is np.ndarray and value.dtype.kind in "biuf" and value.nbytes <= MOST_BYTES:
+        return value.dtype.str, value.shape, value.tobytes()
+    if kind is list and len(value) <= MOST_ITEMS:
+        return kind, *(_of(each, reading) for each in value)
+    if kind is dict and len(value) <= MOST_ITEMS:
+        return kind, *((_of(key, reading), _of(each, reading)) for key, each in value.items())
+    if kind is partial:
+        return kind, *(_of(each, reading) for each in (value.func, value.args, value.keywords))
     raise Unknown
 
 
-def _of_function(function: FunctionType, seen: list[Any]) -> Any:
-    for i, each in enumerate(seen):
+def _of_function(function: FunctionType, reading: Reading) -> Any:
+    for i, each in enumerate(reading.functions):
         if each is function:
             return "again", i
-    seen.append(function)
+    keywords = function.__kwdefaults__
+    reading.functions.append(function)
+    reading.defaults.append((function.__code__, function.__defaults__, keywords))
     names = function.__globals__
     builtins = names.get("__builtins__")
     known = vars(builtins) if isinstance(builtins, ModuleType) else builtins or {}
+    reading.names.append((names, "__builtins__", names.get("__builtins__", _MISSING)))
     read = []
     for name in _names(function.__code__):
+        reading.names.append((names, name, names.get(name, _MISSING)))
         if name in names:
-            read.append((name, _of(names[name], seen)))
-        elif not _is_pure(known.get(name)):
+            read.append((name, _of(names[name], reading)))
+            continue
+        reading.names.append((known, name, known.get(name, _MISSING)))
+        if not _is_pure(known.get(name)):
             raise Unknown
+    cells = function.__closure__ or ()
     try:
-        captured = tuple(_of(cell.cell_contents, seen) for cell in function.__closure__ or ())
+        reading.cells += [(cell, cell.cell_contents) for cell in cells]
     except ValueError:  # an empty cell
         raise Unknown from None
-    defaults = _of(function.__defaults__, seen), _of(function.__kwdefaults__, seen)
-    return function.__code__, tuple(read), captured, defaults, _of(vars(function), seen)
+    captured = tuple(_of(cell.cell_contents, reading) for cell in cells)
+    by_name = []
+    if keywords is not None:
+        reading.names += [(keywords, name, value) for name, value in keywords.items()]
+        by_name = [(name, _of(value, reading)) for name, value in keywords.items()]
+    own = _of(vars(function), reading) if vars(function) else None
+    return function.__code__, tuple(read), captured, _of(function.__defaults__, reading), tuple(by_name), own
 
 
 def _is_pure(value: Any) -> bool:

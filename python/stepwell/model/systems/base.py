@@ -262,6 +262,26 @@ class System(Immutable, ValueEquality, ABC):
         """The arguments whose numbers reach the step as they are: the name in the core, and what each number is above."""
         return {name: (name, least) for name, least in self.unchanged.items()}
 
+    def structure(self) -> Any:
+        """A key of all but the numbers that reach the step as they are: systems of equal keys differ in these alone.
+
+        None if that is more than numbers and words, which may change unseen.
+        """
+        return _contents(self, self.direct())
+
+    def numbers_of_step(self, batch: Shape, *, series: bool) -> tuple[list[Array], Any]:
+        """The arrays of numbers that a step takes, in the order of the core, and all else that it takes."""
+        values = [value for _, value in self.parameters(batch, series=series)]
+        others = [value for value in values if type(value) is not np.ndarray]
+        return (
+            [value for value in values if type(value) is np.ndarray],
+            [(*value[:2], value[2].tobytes()) if type(value) is tuple else value for value in others],
+        )
+
+    def with_numbers_of(self, other: System) -> System:
+        """This system, known for the shapes of a state, with the numbers of another one of the same structure."""
+        return other
+
     def own_axes(self, name: str) -> int:
         """How many axes of its own an argument has that does not reach the step as it is."""
         return 0
@@ -531,6 +551,38 @@ class System(Immutable, ValueEquality, ABC):
     def with_pulse(self, name: str, values: Array, interval: float, start: float = 0.0) -> System:
         """This system with these samples as its only input."""
         raise KeyError(name)
+
+
+#: A system is known by its parameters if they have at most so many bytes, but for those of which the shapes alone count.
+MOST_BYTES_OF_PARAMETERS = 1 << 14
+
+
+def _contents(part: Immutable, direct: Iterable[str]) -> tuple[Any, ...] | None:
+    """All that tells a system, or a part of it, from others, but for the numbers of direct arguments; None if that is unknown."""
+    contents: list[Any] = [type(part)]
+    size = 0
+    for name, each in vars(part).items():
+        kind = type(each)
+        contents.append(name)
+        if kind is np.ndarray:
+            if name in direct:
+                contents.append(each.shape)
+                continue
+            size += each.nbytes
+            if size > MOST_BYTES_OF_PARAMETERS or each.dtype.hasobject:
+                return None
+            contents += (each.shape, each.dtype.char, each.tobytes())
+        elif kind is float:
+            contents.append(each.hex())  # zeros have signs
+        elif each is None or kind is str or kind is bool or kind is int:
+            contents += (kind, each)
+        elif kind is tuple and all(type(length) is int for length in each):
+            contents.append(each)
+        elif isinstance(each, Immutable) and (of_part := _contents(each, ())) is not None:
+            contents.append(of_part)
+        else:
+            return None
+    return tuple(contents)
 
 
 def joined(system: System, fresh: System, names: Iterable[str]) -> dict[str, Any]:

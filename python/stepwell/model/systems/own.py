@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import nullcontext
-from math import prod
+from math import isfinite, prod
 from typing import Any, Self
 
 import numpy as np
@@ -56,27 +56,45 @@ class OwnSystem(System):
     reference = Reference
     #: The control that keeps an invariant as a part of the rates, or None.
     push: Control | None = None
+    definition: Definition
+    parameters_given: dict[str, Any]
+    equations: Equations | None
+    _core: Any
+    _single: dict[bool, Any]
+    _with_functions: tuple[Any, Any] | None
+    _bounds: dict[tuple[Shape, Shape], OwnSystem]
+    _met: dict[tuple[Shape | None, Shape | None], OwnSystem]
 
     def __init__(self, definition: Definition, parameters: dict[str, Any]) -> None:
-        self.definition = definition
-        self.parameters_given: dict[str, Any] = {}
+        checked: dict[str, Any] = {}
         batches: dict[str, Shape] = {}
         for name, value in parameters.items():
+            own = definition.own_axes[name]
+            if type(value) is float and isfinite(value) and not own:  # the most frequent case
+                checked[name] = number = np.array(value)
+                number.flags.writeable = False
+                continue
             argument = f"{definition.name}: {name}"
-            self.parameters_given[name], batches[argument] = _checked(argument, value, definition.own_axes[name])
-        self.batch = checks.batch_shape(batches)
-        self.second_order = definition.order == 2 and definition.blocks == 1
-        self.equations: Equations | None = None
+            checked[name], batches[argument] = _checked(argument, value, own)
+        second_order = definition.order == 2 and definition.blocks == 1
+        # Together, since systems are made in loops, and an assignment takes longer here than in other objects.
+        vars(self).update(
+            definition=definition,
+            parameters_given=checked,
+            batch=checks.batch_shape(batches),
+            second_order=second_order,
+            equations=None,
+            # The operations of the function, and those in float32.
+            _core=None,
+            _single={},
+            # The rates ``_core``, and these rates with the derivatives of their functions, for series.
+            _with_functions=None,
+            # This system for blocks of these shapes, and for states of these shapes, which may have batch axes.
+            _bounds={},
+            _met={},
+        )
         if definition.stick_friction is not None:
             self.around = (OwnFriction(definition),)
-        #: The operations of the function, and those in float32.
-        self._core: Any = None
-        self._single: dict[bool, Any] = {}
-        #: The rates ``_core``, and these rates with the derivatives of their functions, for series.
-        self._with_functions: tuple[Any, Any] | None = None
-        #: This system for blocks of these shapes, and for states of these shapes, which may have batch axes.
-        self._bounds: dict[tuple[Shape, Shape], OwnSystem] = {}
-        self._met: dict[tuple[Shape | None, Shape | None], OwnSystem] = {}
 
     @property
     def keeper(self) -> AnyControl | None:
@@ -163,16 +181,55 @@ class OwnSystem(System):
         key = shapes.get("v"), shapes.get("y")
         if (known := self._met.get(key)) is not None:
             return known
+        if len(self._met) >= MOST_SHAPES:
+            self._met.clear()
+        structure = self.structure()
+        by_shapes = {} if structure is None else structure[0].by_shapes
+        if (alike := by_shapes.get((structure, key))) is not None:
+            self._met[key] = alike.with_numbers_of(self)
+            return self._met[key]
         refused: list[TraceError] = []
         for v_shape, y_shape in self._candidates(shapes):
             try:
-                if len(self._met) >= MOST_SHAPES:
-                    self._met.clear()
                 self._met[key] = self._bound(v_shape, y_shape)
-                return self._met[key]
             except TraceError as error:
                 refused.append(error)
+                continue
+            if len(by_shapes) >= MOST_SHAPES:
+                by_shapes.clear()
+            by_shapes[structure, key] = self._met[key]._with_parameters({})  # without the numbers, which may be many
+            return self._met[key]
         raise self._refusal(shapes, refused)
+
+    def structure(self) -> Any:
+        """A key of the functions, as long as they compute the same, and of the shapes of parameters, if these are numbers."""
+        if self.around or self.push is not None or self.kept is not None or self._members is not None:
+            return None
+        known = self.definition.known()
+        if known is None:
+            return None
+        shapes: list[Shape] = []
+        for value in self.parameters_given.values():
+            if type(value) is not np.ndarray:
+                return None
+            shapes.append(value.shape)
+        return known, tuple(shapes), None if self.equations is None else (self.v_shape, self.y_shape)
+
+    def numbers_of_step(self, batch: Shape, *, series: bool) -> tuple[list[Array], Any]:
+        """Its parameters; what else a step takes follows from its structure."""
+        return list(self.parameters_given.values()), None
+
+    def with_numbers_of(self, other: System) -> OwnSystem:
+        """This system with the parameters of another one of the same structure."""
+        assert isinstance(other, OwnSystem)
+        return self._with_parameters(other.parameters_given)
+
+    def _with_parameters(self, parameters: dict[str, Any]) -> OwnSystem:
+        """This system with parameters that were checked, of the same shapes."""
+        same: OwnSystem = object.__new__(type(self))
+        vars(same).update(vars(self))
+        vars(same).update(parameters_given=parameters, _bounds={}, _met={})
+        return same
 
     def _refusal(self, shapes: dict[str, Shape], refused: list[TraceError]) -> Exception:
         """The error to raise if the function fails with every candidate shape; ``refused`` has the candidates' errors."""

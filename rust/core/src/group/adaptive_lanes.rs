@@ -182,6 +182,20 @@ impl AdaptiveBatch for AdaptiveLanes {
         }
     }
 
+    fn renew(&mut self, spec: &Spec) -> bool {
+        self.step.take_common(&self.tapes.step, spec);
+        if let Some(extension) = &mut self.extension {
+            extension.step.take_common(&extension.stage, spec);
+        }
+        for (one, stage) in [(&mut self.begin, &self.tapes.begin), (&mut self.by_terms, &self.tapes.by_terms)] {
+            if let (Some(one), Some(stage)) = (one, stage) {
+                one.step.take_common(stage, spec);
+                one.member = None;
+            }
+        }
+        true
+    }
+
     fn set_state(&mut self, lane: usize, state: &[f64]) {
         let lanes = self.step.lanes();
         for (row, number) in self.state.chunks_exact_mut(lanes).zip(state) {

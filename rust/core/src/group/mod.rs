@@ -94,6 +94,12 @@ pub trait AdaptiveBatch: Send {
     /// Takes the parameters of a member into one lane.
     fn prepare_lane(&mut self, spec: &Spec, lane: usize, member: usize);
 
+    /// Takes other numbers for the parameters that all members have in common, before lanes are prepared again. Returns whether
+    /// it did.
+    fn renew(&mut self, _spec: &Spec) -> bool {
+        false
+    }
+
     /// Puts a state, v and y, into a lane.
     fn set_state(&mut self, lane: usize, state: &[f64]);
 

@@ -114,6 +114,11 @@ impl Prepared {
         Ok((!plan.begins || group.begins()).then_some(Prepared { group: Some(group), most_checks }))
     }
 
+    /// Takes other numbers for the same parameters; returns whether it could.
+    pub fn renew(&mut self, spec: &super::Spec) -> bool {
+        self.group.as_mut().is_some_and(|group| group.renew(spec))
+    }
+
     /// Makes the run, and returns whether it did: not if it takes long.
     pub fn run(&mut self, plan: &AdaptiveRun, arrays: Arrays) -> Result<bool, Error> {
         let Some(group) = self.group.take() else { return Ok(false) };

@@ -157,7 +157,7 @@ impl<T: Real> PreparedStage<T> {
     }
 
     /// Computes again what follows from parameters that all members have in common, where these are not what they were.
-    fn take_common(&mut self, stage: &Stage<T>, spec: &Spec) {
+    pub(crate) fn take_common(&mut self, stage: &Stage<T>, spec: &Spec) {
         let mut differs = false;
         for (at, source) in stage.split.sources.iter().enumerate() {
             let UniformSource::Param(i) = *source else { continue };
