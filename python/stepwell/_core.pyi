@@ -414,11 +414,14 @@ def prepared_adaptive(
     *,
     quantities: ModelSpec | None,
     has_amounts: bool,
+    least_change: float,
+    many: float,
 ) -> PreparedAdaptive | None:
     """A run with a tolerance of so many members, whose blocks have so many numbers, without its start.
 
     None if it cannot be prepared. ``shapes`` are those of v and y, with the batch; ``quantities`` is a model that records what
-    the motion keeps; ``has_amounts`` says that it is looked for numbers that became negative.
+    the motion keeps, and ``least_change`` the part of its size by which one has changed; ``has_amounts`` says that it is looked
+    for numbers that became negative. A run of ``many`` accepted steps is for others.
     """
 
 def recorded(

@@ -268,7 +268,7 @@ def test_what_is_written_into_a_run_of_integrate_is_in_no_other(pace: dict[str, 
 
 
 def test_zeros_of_either_sign_are_different_options() -> None:
-    for t0 in (0.0, -0.0, 0.0, -0.0, 0.0, -0.0):
+    for t0 in (0.0, -0.0, 0.0, -0.0, 0.0, -0.0, *map(np.float64, (0.0, -0.0, 0.0, -0.0, 0.0, -0.0))):
         run = sw.integrate(sw.Oscillator(), "dop853", v=0.0, y=1.0, tolerance=1e-6, at=[t0, 1.0], t0=t0)
         assert np.signbit(run.t).tolist() == [t0.hex()[0] == "-", False]
         assert math.copysign(1.0, run.t0) == math.copysign(1.0, t0)
@@ -472,6 +472,10 @@ def test_other_numbers_are_checked_and_judged() -> None:
         assert warned == anew
         said.append(len(warned))
     assert said == [0, 0, 1, 0, 1]
+    for mass in (1.0, 2.0, 3.0):  # own equations with attributes beside their parameters
+        plane = sw.Aircraft(inertia=mass * np.array([1.0, 2.0, 2.5]))
+        run = sw.integrate(plane, "rk4", v=np.zeros(plane.v_shape), y=np.ones(plane.y_shape), **DT)
+        assert run.system == plane
     for beta in (1.0, 2.0, 3.0):
         sw.integrate(duffing(beta=beta), "rk4", v=0.0, y=1.0, dtype="float32", **DT)
     refused(sw.errors.ArgumentError, "beta", sw.integrate, duffing(beta=1e39), "rk4", v=0.0, y=1.0, dtype="float32", **DT)

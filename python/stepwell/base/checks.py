@@ -63,9 +63,9 @@ def with_hints(hints: Mapping[str, str]) -> Callable[[Callable[P, R]], Callable[
     def of(function: Callable[P, R]) -> Callable[P, R]:
         @wraps(function)
         def called(*args: P.args, **named: P.kwargs) -> R:
-            for name in named:
-                if name in hints:
-                    raise UnknownNameError(f"{name}: {function.__name__} has no such argument; {hints[name]}")
+            if not hints.keys().isdisjoint(named):
+                name = next(name for name in named if name in hints)
+                raise UnknownNameError(f"{name}: {function.__name__} has no such argument; {hints[name]}")
             return function(*args, **named)
 
         return called

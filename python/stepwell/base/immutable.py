@@ -111,8 +111,10 @@ class ImmutableMeta(ABCMeta):
             except TypeError:
                 takes(cls, args, kwargs)
                 raise
-            read_only(vars(instance))
-            vars(instance)[DONE] = True
+            attributes = vars(instance)
+            if DONE not in attributes:  # whose ``__init__`` leaves that to be done
+                read_only(attributes)
+                attributes[DONE] = True
             return instance
 
         # ``ABCMeta``'s takes four times as long, because it looks for registered classes; there are none.
@@ -241,6 +243,13 @@ class FixedDict(dict[str, Any]):
                 dict.__setitem__(self, name, frozen(name, value if value.flags.aligned else value.copy()))
             elif type(value) is dict and not name.startswith("_"):
                 dict.__setitem__(self, name, FixedDict(value))
+
+    @classmethod
+    def of_fixed(cls, items: dict[str, Any]) -> FixedDict:
+        """One of items that are read-only already."""
+        fixed = cls.__new__(cls)
+        dict.update(fixed, items)
+        return fixed
 
     def _refuse(self, *_: Any, **__: Any) -> Any:
         raise FixedError("parameters: those of a system cannot be assigned; make another system, with what is to change")

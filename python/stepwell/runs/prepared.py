@@ -37,7 +37,7 @@ class PreparedRun:
     """
 
     def __init__(self, system: System, method: str | Method, options: Options) -> None:
-        self._system, self._method, self._options = system, method, Options(*map(_own, Options._fields, options))
+        self._system, self._method, self._options = system, method, fixed_options(options)
         #: The last small request that was checked as a whole, with the shapes of its blocks in the call; None if others would not
         #: be the same but for the start.
         self._request: tuple[Request, tuple[Shape, Shape]] | None = None
@@ -132,8 +132,12 @@ def prepare(system: System, method: str | Method, *, v: Any = None, y: Any = Non
     return prepared
 
 
+def fixed_options(options: Options) -> Options:
+    """Options that do not change any more."""
+    return Options(*map(_own, Options._fields, options))
+
+
 def _own(name: str, option: Any) -> Any:
-    """An option that does not change any more."""
     if isinstance(option, np.ndarray):
         return frozen(name, option)
     if type(option) in (list, tuple):

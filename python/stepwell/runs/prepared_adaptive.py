@@ -14,6 +14,7 @@ from ..model.methods import method
 from ..model.systems import NBody, System
 from . import engine, known_energy
 from .adaptive import of_extra_steps, paces_of, run_of
+from .diagnostics import MANY
 from .request import Request
 from .result import AdaptiveState, Run
 from .short import NOT_MADE, TAME, ShortRun
@@ -102,6 +103,8 @@ def short_adaptive_run(own: System, request: Request, shapes: tuple[Shape, Shape
         plan.members,
         quantities=quantities,
         has_amounts=not numbers[0] and bool(system.groups) and not plan.backward,
+        least_change=known_energy.LITTLE,
+        many=MANY,
     )
     if core is None:
         return None

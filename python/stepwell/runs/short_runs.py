@@ -11,7 +11,7 @@ from .. import _core
 from ..model.methods import Method
 from ..model.systems import System
 from .options import Options
-from .prepared import MOST_BYTES, short_run_of
+from .prepared import MOST_BYTES, fixed_options, short_run_of
 from .result import Run
 from .short import ShortRun
 
@@ -52,9 +52,14 @@ class _Numbers(NamedTuple):
 _PLAIN = frozenset({type(None), bool, int, float, str, np.float64, _Numbers})
 
 
+#: The types of all options of calls, none of which has options with numbers to look up; and the most of these.
+_plain_kinds: set[tuple[type, ...]] = set()
+MOST_KINDS = 1024
+
+
 def _signed(option: Any) -> Any:
     """An option; zeros have signs, but are equal."""
-    return option.hex() if type(option) is float and option == 0.0 else option
+    return option.hex() if isinstance(option, float) and option == 0.0 else option
 
 
 def _numbers(option: Any) -> Any:
@@ -65,7 +70,7 @@ def _numbers(option: Any) -> Any:
         return _Numbers(kind, types, tuple(map(_signed, option))) if _PLAIN.issuperset(types) else option
     if kind is np.ndarray and option.size <= MOST_NUMBERS and option.dtype == np.float64:
         return _Numbers(kind, option.shape, option.tobytes())
-    return _signed(option)
+    return option
 
 
 def _block(block: Any) -> Any:
@@ -83,10 +88,18 @@ def short_run(system: System, method: str | Method, options: Options) -> Run | N
 
     What it returns is what a run from its arguments is, to the bit, with its findings. Options are known by their numbers.
     """
-    others = (*options[2:5], _numbers(options.tolerance), _numbers(options.at), _signed(options.t0), *options[7:])
+    others: tuple[Any, ...] = options[2:]
     kinds = tuple(map(type, others))
-    if not _PLAIN.issuperset(kinds) or not isinstance(system, System) or _core.names_device():
+    if kinds not in _plain_kinds:
+        others = tuple(map(_numbers, others))
+        if not _PLAIN.issuperset(map(type, others)):
+            return None
+        if _PLAIN.issuperset(kinds) and len(_plain_kinds) < MOST_KINDS:
+            _plain_kinds.add(kinds)
+    if not isinstance(system, System) or _core.names_device():
         return None
+    if isinstance(options.t0, float) and options.t0 == 0.0:
+        others = (*others, _signed(options.t0))
     structure = system.structure()
     v, y = start = _block(options.v), _block(options.y)
     shapes = tuple([each.shape if type(each) is np.ndarray else () if type(each) is float else None for each in start])
@@ -110,4 +123,4 @@ def _prepared(system: System, method: str | Method, options: Options) -> ShortRu
     attributes = list(vars(system).values())
     in_dictionaries = [each for attribute in attributes if isinstance(attribute, dict) for each in attribute.values()]
     size = sum(getattr(each, "nbytes", 0) for each in attributes + in_dictionaries)
-    return None if size > MOST_BYTES else short_run_of(system, method, options)
+    return None if size > MOST_BYTES else short_run_of(system, method, fixed_options(options))

@@ -22,11 +22,6 @@ use crate::{
     world::machine,
 };
 
-/// A quantity has changed if its change is more than this part of its size: see `LITTLE` in `runs/known_energy.py`.
-const LITTLE: f64 = 1.0 / 1024.0;
-/// From so many accepted steps on it is looked for stiffness: see `MANY` in `runs/diagnostics.py`.
-const MANY: f64 = 512.0;
-
 /// A run of adaptive steps without its start.
 #[pyclass(module = "stepwell._core", frozen)]
 pub struct PreparedAdaptive {
@@ -36,6 +31,10 @@ pub struct PreparedAdaptive {
     shapes: [Vec<usize>; 2],
     /// Whether it is looked for amounts that became negative.
     has_amounts: bool,
+    /// A quantity has changed if its change is more than this part of its size.
+    least_change: f64,
+    /// From so many accepted steps on more is looked for than here.
+    many: f64,
 }
 
 /// What is kept from run to run.
@@ -108,7 +107,7 @@ impl Input {
 /// A prepared run of members with these paces, from starts whose blocks have these shapes, none for one number. `quantities` is a
 /// model that records what the true motion keeps. None if a run cannot be prepared.
 #[pyfunction]
-#[pyo3(signature = (model, plan, pacing, paces, shapes, numbers, members, *, quantities, has_amounts))]
+#[pyo3(signature = (model, plan, pacing, paces, shapes, numbers, members, *, quantities, has_amounts, least_change, many))]
 #[allow(clippy::too_many_arguments, reason = "in Python they have names")]
 pub(crate) fn prepared_adaptive(
     py: Python<'_>,
@@ -121,6 +120,8 @@ pub(crate) fn prepared_adaptive(
     members: usize,
     quantities: Option<Bound<'_, ModelSpec>>,
     has_amounts: bool,
+    least_change: f64,
+    many: f64,
 ) -> PyResult<Option<PreparedAdaptive>> {
     let spec = model.get();
     if spec.precision == Precision::Single || plan.progress.is_some() {
@@ -155,7 +156,7 @@ pub(crate) fn prepared_adaptive(
     drop(run);
     let state = vec![0.0; (numbers[0] + numbers[1]) * members];
     let kept = Kept { lanes, quantities, input, state, status: vec![0; members], is_long: false };
-    Ok(Some(PreparedAdaptive { model: model.unbind(), kept: Mutex::new(kept), shapes, has_amounts }))
+    Ok(Some(PreparedAdaptive { model: model.unbind(), kept: Mutex::new(kept), shapes, has_amounts, least_change, many }))
 }
 
 #[pymethods]
@@ -211,7 +212,7 @@ impl PreparedAdaptive {
         };
         let is_made = lanes.run(&run, to_fill).map_err(core_error)?;
         let accepted = paces.chunks_exact(input.members).nth(Pace::<f64>::ACCEPTED);
-        *is_long = !is_made || accepted.is_none_or(|accepted| accepted.iter().any(|accepted| *accepted >= MANY));
+        *is_long = !is_made || accepted.is_none_or(|accepted| accepted.iter().any(|accepted| *accepted >= self.many));
         if *is_long || status.iter().any(|status| *status != 0) {
             return Ok(0);
         }
@@ -231,7 +232,7 @@ impl PreparedAdaptive {
         let is_kept = quantities.as_mut().is_none_or(|(quantities, _)| {
             let first = quantities.recorded(&input.v.numbers, &input.y.numbers);
             let end = [&saved_v[last(saved_v, end_v.len())..], &saved_y[last(saved_y, end_y.len())..]];
-            let change = |(first, last): (&f64, &f64)| (last - first).abs() <= LITTLE * first.abs().max(last.abs());
+            let change = |(first, last): (&f64, &f64)| (last - first).abs() <= self.least_change * first.abs().max(last.abs());
             first.iter().zip(&quantities.recorded(end[0], end[1])).all(change)
         });
         Ok(if is_kept { 2 } else { 1 })

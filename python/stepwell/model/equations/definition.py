@@ -39,7 +39,7 @@ class Known:
 
     def holds(self, number: int) -> bool:
         """Whether these are the functions, so many, and they read the same objects."""
-        return len(self.readings) == number and all(each.holds() for each in self.readings)
+        return len(self.readings) == number and all(map(Reading.holds, self.readings))
 
 
 class Definition:

@@ -13,7 +13,7 @@ import numpy as np
 from ... import _core
 from ...base import checks
 from ...base.arrays import Array, Shape
-from ...base.immutable import changed, complete
+from ...base.immutable import DONE, FixedDict, changed, complete, frozen
 from ...errors import ShapeError, TraceError, UnsupportedError
 from ...reference.around import Bound
 from ...reference.marks import Marks, recording
@@ -59,9 +59,11 @@ class OwnSystem(System):
     definition: Definition
     parameters_given: dict[str, Any]
     equations: Equations | None
+    #: The operations of the function, and those in float32; and the operations with the derivatives of functions, for series.
     _core: Any
     _single: dict[bool, Any]
     _with_functions: tuple[Any, Any] | None
+    #: This system for blocks of these shapes, and for states of these shapes, which may have batch axes.
     _bounds: dict[tuple[Shape, Shape], OwnSystem]
     _met: dict[tuple[Shape | None, Shape | None], OwnSystem]
 
@@ -71,30 +73,30 @@ class OwnSystem(System):
         for name, value in parameters.items():
             own = definition.own_axes[name]
             if type(value) is float and isfinite(value) and not own:  # the most frequent case
-                checked[name] = number = np.array(value)
+                number = np.array(value)
                 number.flags.writeable = False
+                checked[name] = number
                 continue
             argument = f"{definition.name}: {name}"
-            checked[name], batches[argument] = _checked(argument, value, own)
-        second_order = definition.order == 2 and definition.blocks == 1
-        # Together, since systems are made in loops, and an assignment takes longer here than in other objects.
+            value, batches[argument] = _checked(argument, value, own)
+            checked[name] = frozen(name, value) if isinstance(value, np.ndarray) else value
+        # All at once, and read-only already: systems are made in loops, where assignments and checks would take most of the time.
         vars(self).update(
             definition=definition,
-            parameters_given=checked,
-            batch=checks.batch_shape(batches),
-            second_order=second_order,
+            parameters_given=FixedDict.of_fixed(checked),
+            batch=checks.batch_shape(batches) if batches else (),
+            second_order=definition.order == 2 and definition.blocks == 1,
             equations=None,
-            # The operations of the function, and those in float32.
             _core=None,
             _single={},
-            # The rates ``_core``, and these rates with the derivatives of their functions, for series.
             _with_functions=None,
-            # This system for blocks of these shapes, and for states of these shapes, which may have batch axes.
             _bounds={},
             _met={},
         )
         if definition.stick_friction is not None:
             self.around = (OwnFriction(definition),)
+        if type(self) is OwnSystem:  # others have more attributes to set
+            vars(self)[DONE] = True
 
     @property
     def keeper(self) -> AnyControl | None:
@@ -203,7 +205,8 @@ class OwnSystem(System):
 
     def structure(self) -> Any:
         """A key of the functions, as long as they compute the same, and of the shapes of parameters, if these are numbers."""
-        if self.around or self.push is not None or self.kept is not None or self._members is not None:
+        acted_on = self.around or self.push is not None or self.kept is not None or self._members is not None
+        if acted_on or type(self) is not OwnSystem:  # others have more attributes than parameters
             return None
         known = self.definition.known()
         if known is None:
