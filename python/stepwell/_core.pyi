@@ -59,19 +59,19 @@ class Equations:
 
     @property
     def reads_v(self) -> bool:
-        """Whether a rate of v depends on v."""
+        """True if a rate of v depends on v."""
 
     @property
     def reads_time(self) -> bool:
-        """Whether anything depends on the time."""
+        """True if anything depends on the time."""
 
     @property
     def chooses(self) -> bool:
-        """Whether the rates are made of pieces, one of which is chosen by the state or the time."""
+        """True if the rates are made of pieces, one of which is chosen by the state or the time."""
 
 @final
 class ModelSpec:
-    """What to step: a system, what is given for it, and a method.
+    """The model that the core steps: a system, the values given for it, and a method.
 
     ``given`` is a list of names with words (str), whole numbers (int), rows of numbers (NDArray), or tables of samples: a tuple
     (start, interval, rows), a row for each sample. A sinusoid ``x`` is given as ``x.amplitude``, ``x.omega`` and ``x.phase``, a
@@ -178,14 +178,14 @@ class World:
         """Make steps; whether a number of the state is not finite then, if that was looked at."""
 
     def step_and_look(self, n: int, events: object) -> tuple[bool, object]:
-        """The same with events, of float64; and what was found, as by ``run_and_look``."""
+        """Make steps with events, of float64; also what was found, as by ``run_and_look``."""
 
     def carry(self) -> NDArray[Any] | None: ...
     def carry_on(self, carry: NDArray[Any]) -> None:
         """Go on with this carry, by rows, which belongs to what is in the arrays now."""
 
     def memory(self) -> NDArray[Any]:
-        """What a sampled controller remembers, by rows."""
+        """The memory of a sampled controller, by rows."""
 
     def remember(self, memory: NDArray[Any]) -> None:
         """Let a sampled controller remember this, by rows."""
@@ -228,7 +228,7 @@ class Symbol:
 
     @property
     def single(self) -> bool:
-        """Whether its numbers are those of float32."""
+        """True if its numbers are float32."""
 
     def __add__(self, other: _Value, /) -> Symbol: ...
     def __radd__(self, other: _Value, /) -> Symbol: ...
@@ -301,20 +301,20 @@ class Tape:
 
     @property
     def single(self) -> bool:
-        """Whether its numbers are those of float32."""
+        """True if its numbers are float32."""
 
     def value(self, id: int) -> Symbol:
         """The value that the operation of that number makes."""
 
     def sample(self, table: int, t: _Value) -> Symbol: ...
     def trace(self, model: ModelSpec, what: str) -> list[Symbol]:
-        """What the core makes of a model: "step", "attempt", "begin", "start 0", "finish 0", or "record" and a quantity."""
+        """The values of a part of a model: "step", "attempt", "begin", "start 0", "finish 0", or "record" and a quantity."""
 
     def listing(self, of: Symbol) -> str:
         """The operations that a value is made of."""
 
     def operations(self, of: list[Symbol]) -> tuple[list[tuple[str, list[int], int]], list[int]]:
-        """What these values are made of, in order: names, operands, what else they take; and the places of the values."""
+        """The operations that make these values, in order: names, operands, what else they take; and the places of the values."""
 
     def equations(
         self,
@@ -326,7 +326,7 @@ class Tape:
         mass: list[list[tuple[int, float]]] | None = None,
         friction: tuple[list[Symbol], int, tuple[int, list[Symbol]] | None] | None = None,
     ) -> Equations:
-        """These values as the rates of a system; without ``dy``, ẏ is v.
+        """The equations of a system with these values as its rates; without ``dy``, ẏ is v.
 
         ``functions`` are values with, for each that they depend on, the derivative by it; of one branch of several, its bounds;
         and whether they are made of pieces. ``mass`` is the mass matrix: of each row the columns and entries that are not zero.
@@ -340,7 +340,7 @@ class Tape:
         """A tape with fused multiply-adds in what these values need, and the values on it."""
 
     def evaluation(self, of: list[Symbol], states: int) -> Evaluation | None:
-        """These values for many members at once, from so many numbers of a state and from parameters.
+        """An evaluation of these values for many members at once, from so many numbers of a state and from parameters.
 
         None if they depend on a step or a time.
         """
@@ -358,13 +358,13 @@ def tape_operations() -> list[tuple[str, int, str, bool]]:
     """Of each operation its name, its number of operands, among which it is counted, and whether they may be exchanged."""
 
 def sound(value: object, finite: bool, positive: bool) -> bool:
-    """Whether it is a contiguous, aligned array of floats, and all are finite, and above zero, where that is asked."""
+    """True for a contiguous, aligned array of floats, if all are finite, and above zero, where that is asked."""
 
 def systems() -> list[str]: ...
 def isa() -> str: ...
 def isa_levels() -> list[str]: ...
 def names_device() -> bool:
-    """Whether the environment variable ``STEPWELL_DEVICE`` names a device."""
+    """True if the environment variable ``STEPWELL_DEVICE`` names a device."""
 
 def ask(function: Callable[[], object] | None) -> None:
     """Let this thread ask a function at intervals while it steps, or none; what the function raises ends the run."""
@@ -381,7 +381,7 @@ def run_and_look(model: ModelSpec, plan: Plan, arrays: Arrays, events: object) -
     """``run`` with events, of ``runs.events.by_core``: also what was found of them."""
 
 def run(model: ModelSpec, plan: Plan, arrays: Arrays) -> bool:
-    """Whether some member has diverged, now or before.
+    """Make the steps of a run; True if some member has diverged, now or before.
 
     Of the plan it reads ``t0``, ``dt``, ``choice``, ``first``, ``steps``, ``every``, ``threads`` and ``progress``.
     """
@@ -436,7 +436,7 @@ def check(model: ModelSpec) -> None:
     """Raise if it cannot be stepped so."""
 
 def compiled(model: ModelSpec, members: int, *, choice: int = 0, attempts: bool = False) -> dict[str, Any] | None:
-    """What a step becomes, traced and compiled anew for so many members; None if it is too long for one tape.
+    """The description of a step, traced and compiled anew for so many members; None if it is too long for one tape.
 
     ``level``; ``written`` and ``computed``, numbers of operations by kind: before equal ones were merged, but for those that a
     method does to blocks, and as every member makes them in every step; ``per_run``, ``per_member`` and ``per_step``, how many
@@ -487,7 +487,7 @@ def forget() -> None:
 def program(
     method: str, *, attempts: bool = False, stage: str = "step", choice: int = 0
 ) -> tuple[list[tuple[str, list[int], float]], list[int]]:
-    """What a method does to blocks, and the places of the new blocks; of attempts also those of estimates of the error.
+    """The operations of a method on blocks, and the places of the new blocks; of attempts also those of estimates of the error.
 
     The stages beside "step" are "start", which turns v into what stands in its place between steps, with the blocks that are
     kept behind it, and "finish", which turns that into v; ``choice`` is the number of the way to start.

@@ -46,7 +46,7 @@ class NotFiniteError(ArgumentError):
 class TraceError(ArgumentError):
     """A user's own equations do something that cannot be traced; the message names the line and what to write instead."""
 
-    #: Whether the cause may be that the state has another shape than the function expects.
+    #: True if the cause may be that the state has another shape than the function expects.
     of_shape = False
 
     def __init__(self, *args: object) -> None:

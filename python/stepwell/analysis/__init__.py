@@ -1,1 +1,1 @@
-"""What is known of a step: stability, derivatives, dynamics."""
+"""Analysis of steps: stability, derivatives, dynamics."""

@@ -152,7 +152,7 @@ class _Algebraic:
             return np.asarray(np.linalg.slogdet(_stacked(self.along))[0]).reshape(self.singular.shape)
 
     def determined(self) -> _Algebraic:
-        """These equations, or an error if they do not determine the numbers that they are for."""
+        """Return these equations, or raise if they do not determine the numbers that they are for."""
         if self.singular.any():
             raise UnsupportedError(
                 f"mass: the algebraic equations of {self._system!r} do not determine the numbers that they are for (their index "
@@ -180,7 +180,7 @@ def lost(system: System, start: tuple[Array, Any], end: tuple[Array, Any], sizes
 
 
 def _singular(matrices: Array, terms: Array) -> np.ndarray[Any, np.dtype[np.bool_]]:
-    """Whether algebraic equations do not determine the numbers that they are for, as with an index above 1.
+    """True where algebraic equations do not determine the numbers that they are for, as with an index above 1.
 
     Of a full M their derivatives are sums, of which an index above 1 leaves rounding: that is little beside the ``terms``.
     """

@@ -23,7 +23,7 @@ from ..runs.findings import Finding, at_places, may_have_amounts, warn_of
 #: A state is looked at once it is this many times as long as at the start; from rest, once it is this many units long.
 GROWN = 1e6
 
-#: The same where a force may turn the velocity: some methods then grow by a little at every step, however short.
+#: As ``GROWN``, where a force may turn the velocity: some methods then grow by a little at every step, however short.
 GROWN_OF_TURNING = 10.0
 
 #: So many numbers are compared at once.
@@ -193,7 +193,7 @@ class _Factors:
         return float(self._dt if self._each is None else self._each[member])
 
     def limit(self, member: int) -> str:
-        """What to do about a member, with its stability limit where that is quickly computed."""
+        """The advice for a member, with its stability limit where that is quickly computed."""
         from .stability import maps
 
         if sum(maps.size(self._system)) > SMALL_SYSTEM:
@@ -252,7 +252,7 @@ def _of_run(run: Any, start: tuple[Array, Array], steps: int) -> Growth | None:
 
 
 def _is_tame(run: Any, start: tuple[Array, Array]) -> bool:
-    """Whether it is certain, without the length of each member, that none has grown: so it is for nearly all runs.
+    """True if it is certain, without the length of each member, that none has grown: so it is for nearly all runs.
 
     Then all numbers at the end, taken as one vector, are not so many times as long as the shortest member at the start.
     """

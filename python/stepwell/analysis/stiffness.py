@@ -81,7 +81,7 @@ class Stand(NamedTuple):
 
 
 class Held(NamedTuple):
-    """What holds down the steps from where members stand; a rate and a limit are zero where no matrix says them.
+    """The stability bound on the steps from where members stand; a rate and a limit are zero where no matrix gives them.
 
     Attributes:
         ratio: how many times as long steps the tolerance allows; 0 if it is not stability that holds them down.
@@ -144,7 +144,7 @@ class Stiff(NamedTuple):
         return len(self.members)
 
 
-#: What is said of stiff members, before it is said why.
+#: Message about stiff members, before the reason.
 HELD_DOWN = "stability, and not the tolerance, held down the steps of"
 
 
@@ -220,7 +220,6 @@ def _times(ratio: float) -> str:
 
 
 def _advice(course: Course) -> str:
-    """What to take for stiff equations."""
     instead = for_stiff(course.tolerance)
     if instead is not None:
         try:
@@ -270,7 +269,7 @@ def _places(groups: tuple[int, ...], n_v: int, n_y: int) -> list[list[int]]:
 
 
 def _hardly_moves(row: list[float], groups: list[list[int]], of_v: int, has_own: bool, exponent: float, lost: float) -> bool:
-    """Whether the step to a waypoint moved a member as little as one that stability holds down.
+    """True if the step to a waypoint moved a member as little as one that stability holds down.
 
     The largest sizes so far stand for the present ones, which allows rather more than is tolerated.
     """
@@ -321,13 +320,12 @@ def stands_of(course: Course, waypoints: Array | None, members: Whole) -> list[S
 
 
 def _verdicts(course: Course, stands: Sequence[Stand]) -> list[Held]:
-    """What holds down the steps from each of some places where members stand, found for all together."""
+    """The stability bounds on the steps from each of some places where members stand, found for all together."""
     held = _held(course, Stand(*(np.concatenate(each, axis=-1) for each in zip(*stands, strict=True))))
     return [Held(*each) for each in zip(*(np.split(numbers, len(stands)) for numbers in held), strict=True)]
 
 
 def _held(course: Course, stand: Stand) -> Held:
-    """What holds down the steps from where members stand."""
     plan, jumps = Members(course.plan._replace(progress=None)).plan(stand.members), course.walls(stand.members)
     paces = np.array(stand.paces)
     paces[[engine.EXTRA, engine.HELD, *range(engine.COUNTS.start, engine.COUNTS.stop)]] = 0.0
@@ -372,7 +370,7 @@ def _smooth_for(plan: engine.Plan, v: Array, y: Array, paces: Array) -> Array:
 
 
 def _besides_a_polynomial(states: Array) -> Array:
-    """What is left of states at equal distances besides the polynomials that fit them best; the first axis becomes the last."""
+    """The residual of states at equal distances after a least-squares fit of polynomials; the first axis becomes the last."""
     places = np.linspace(-1.0, 1.0, len(states))
     q, _ = np.linalg.qr(np.polynomial.chebyshev.chebvander(places, DEGREE))
     rows = states.reshape(len(states), -1)

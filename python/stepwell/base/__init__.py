@@ -1,1 +1,1 @@
-"""What everything stands on: checks of arguments, immutable values, memory, files, progress. Imports nothing but ``errors``."""
+"""Foundations: checks of arguments, immutable values, memory, files, progress. Imports nothing but ``errors``."""

@@ -394,7 +394,7 @@ def member(array: Array, index: Shape) -> Array:
 
 
 def is_single(dtype: Any) -> bool:
-    """Whether float32 is asked for; raise if it is neither that nor float64."""
+    """True if float32 is asked for; raises if it is neither that nor float64."""
     if dtype is np.float64 or (type(dtype) is str and dtype == "float64"):
         return False  # the usual case: NumPy takes 3 µs to name a type
     if dtype is np.float32 or (type(dtype) is str and dtype == "float32"):
@@ -420,13 +420,13 @@ def fits_single(name: str, numbers: Array | None) -> None:
         raise ArgumentError(f"{name}: expected numbers up to 3.4e38, the largest of float32, got {large.max():g}")
 
 
-#: What to do about complex numbers.
+#: Advice on complex numbers.
 COMPLEX = "write the equations of real and imaginary parts: of dz/dt = −iωz with z = y[0] + 1j*y[1], [omega*y[1], -omega*y[0]]"
 
-#: What numbers of a kind are above: finite ones, those of zero or more, and those above zero.
+#: Lower bounds, excluded, of kinds of numbers: finite ones, those of zero or more, and those above zero.
 ANY, NOT_NEGATIVE, POSITIVE = -float("inf"), -5e-324, 0.0
 
-#: What is larger than this rounds to infinity in float32.
+#: A number larger than this rounds to infinity in float32.
 LARGEST_SINGLE = float(np.finfo(np.float32).max)
 
 

@@ -35,7 +35,7 @@ class ValueEquality:
             cls.__repr__ = one_line  # type: ignore[method-assign]
 
     def _contents(self) -> dict[str, Any]:
-        """What is compared, by name: the fields of a dataclass, without values that it cached, or else all attributes."""
+        """The compared values by name: the fields of a dataclass, without values that it cached, or else all attributes."""
         if dataclasses.is_dataclass(self):
             return {field.name: getattr(self, field.name) for field in dataclasses.fields(self) if field.compare}
         return {name: value for name, value in vars(self).items() if name != DONE}
@@ -71,7 +71,7 @@ def by_value(kind: type[Kind]) -> type[Kind]:
 
 
 def same(a: Any, b: Any) -> bool:
-    """Whether two values are equal: arrays by shape, dtype and numbers, containers element by element."""
+    """True if two values are equal: arrays by shape, dtype and numbers, containers element by element."""
     if a is b:
         return True
     if isinstance(a, np.ndarray) or isinstance(b, np.ndarray):
@@ -156,7 +156,6 @@ class Immutable(metaclass=ImmutableMeta):
 
     @property
     def _instead(self) -> str:
-        """What to do instead of a change."""
         return f"make another {type(self).__name__}, with what is to change"
 
     def __setstate__(self, state: dict[str, Any]) -> None:

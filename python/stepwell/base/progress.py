@@ -21,14 +21,14 @@ MIN_SECONDS_BETWEEN = 0.1
 #: The length of a bar of text, in characters.
 BAR_LENGTH = 30
 
-#: What takes the share of the work that is done, and what takes a text beside the title.
+#: Callables that take the share of the work that is done, and a text beside the title.
 Both = tuple[Callable[[float], object], Callable[[str], object]]
 
 #: The least time, and the least share, after which the rest of the time is told.
 SURE_SECONDS, SURE_SHARE = 1.0, 0.02
 
 
-#: What is shown in this thread; it takes a text that stands beside the title.
+#: Display of this thread; it takes a text that stands beside the title.
 _SHOWN: ContextVar[Callable[[str], object]] = ContextVar("shown", default=lambda text: None)
 
 
@@ -101,7 +101,7 @@ def _time_left() -> Callable[[float], str]:
 
 
 def in_notebook() -> bool:
-    """Whether this process is the kernel of a notebook; IPython in a terminal is not."""
+    """True if this process is the kernel of a notebook; IPython in a terminal is not."""
     shell = getattr(sys.modules.get("IPython"), "get_ipython", lambda: None)()
     return hasattr(shell, "kernel")
 

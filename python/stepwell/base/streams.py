@@ -13,7 +13,7 @@ OBEYS_ESCAPES = 4
 
 
 def reader_is_gone(error: OSError) -> bool:
-    """Whether writing to a pipe failed because its reader has gone; Windows calls that an invalid argument."""
+    """True if writing to a pipe failed because its reader has gone; Windows calls that an invalid argument."""
     windows_says = sys.platform == "win32" and error.errno == errno.EINVAL and error.filename is None
     return isinstance(error, BrokenPipeError) or windows_says
 
@@ -29,7 +29,7 @@ def write_utf8() -> None:
 
 
 def shows_escapes(stream: TextIO) -> bool:
-    """Whether a stream is a terminal that obeys escape sequences. The console of Windows does once it was asked to."""
+    """True if a stream is a terminal that obeys escape sequences. The console of Windows does once it was asked to."""
     if not stream.isatty():
         return False
     if sys.platform != "win32":

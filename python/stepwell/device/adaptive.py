@@ -31,7 +31,7 @@ PACE = (
     "t", "h", "target", "extra", "held", "relative", "absolute", "lasts", "begin", "interval", "until", "most_step", "wall",
     "before", "most", "accepted", "rejected", "extra_steps", "error", "work",
 )  # fmt: skip
-#: What else a member is between launches: whole numbers, and numbers.
+#: Further state of a member between launches: whole numbers, and numbers.
 MARKS = ("next", "kept", "passed", "held_before", "has_origin", "is_known", "status")
 SEEN = ("seen_accepted", "origin_rejected")
 #: The status of a member that is not at its end.
@@ -43,7 +43,7 @@ FIRST_WAYPOINT, WAYPOINTS = 256, 2
 
 _TEXTS: OrderedDict[Any, tuple[Stages, str]] = OrderedDict()
 
-#: What stands before the kernels: a time of many, by its number, of a member.
+#: Text before the kernels: a time of many, by its number, of a member.
 TIMES = """
 static inline double time_of(__global const double *times, const long width, const long i, const long g) {
     return times[i * width + (width > 1 ? g : 0)];
@@ -61,7 +61,7 @@ static inline double next_time(__global const double *times, const long width, c
     return i < count ? time_of(times, width, i, g) : INFINITY;
 }
 """
-#: What both kernels take behind the arguments of all: the first member of those of this call, their number, and what they are.
+#: Arguments of both kernels behind those of all: the first member of those of this call, their number, and what they are.
 OF_CALL = (
     "const long first_member, const long width, __global const double *restrict jumps, const long jumps_width, const long walls, "
     "__global double *restrict rows, __global double *restrict seen, __global long *restrict marks"
@@ -127,7 +127,7 @@ class _Run:
         self.inputs = machine.put(np.array(of_inputs or [[0.0, 1.0, 0.0]]))
         self.attempts = max(1, min(FIRST_LAUNCH, MOST_AT_FIRST // members))
         self.nothing = machine.room(1)
-        #: What reduces the states at the times; without one they are saved, with one only the last.
+        #: Observer that reduces the states at the times; without one they are saved, with one only the last.
         self.observer: Observer | None = plan.observer
         self.times = len(pacing.at) if self.observer is None else 1
         self.reduced = self.nothing if self.observer is None else machine.room(8 * self.observer.size * members)
@@ -453,7 +453,7 @@ class _Kernels:
         return total
 
     def holds(self) -> str:
-        """Whether the next saved time is within the held step."""
+        """The condition, as text, that the next saved time is within the held step."""
         t, h, target, wall, held = (self.of[name] for name in ("t", "h", "target", "wall", "held"))
         return f"{held} > 0.0 && {target} < ({wall} < {t} + {h} ? {wall} : {t} + {h})"
 

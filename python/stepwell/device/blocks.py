@@ -1,4 +1,4 @@
-"""What a method does to blocks, as kernels: a work item for each number, a kernel between two evaluations of the rates.
+"""Operations of a method on blocks, as kernels: a work item for each number, a kernel between two evaluations of the rates.
 
 A second-order system needs one evaluation, h·v̇ at some places; h·ẏ is h·v. So all that stands between two evaluations is
 elementwise, and a kernel computes the places of the next one, or the new state, from the state and all h·v̇ up to there. What it

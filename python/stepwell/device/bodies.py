@@ -40,7 +40,7 @@ PLAIN = "false_euler"
 
 
 def takes(model: Any, plan: Any) -> bool:
-    """Whether a run is made here: of many bodies, or of so many that this is faster if it is possible."""
+    """True if a run is made here: of many bodies, or of so many that this is faster if it is possible."""
     if plan.system.kernel != "nbody":
         return False
     operations, bodies = _core.operations(model), len(plan.system.masses)
@@ -48,7 +48,7 @@ def takes(model: Any, plan: Any) -> bool:
 
 
 def missing(plan: Any) -> str:
-    """What a run asks for that is not there, in words; "" if nothing."""
+    """The unsupported options of a run, in words; "" if there are none."""
     system, method = plan.system, plan.method
     others = [name for name, _ in system.parameters(plan.batch) if name not in KNOWN | KEEPING]
     asked = {
@@ -208,7 +208,7 @@ class _Run:
         self.machine.set(bodies.tallies, np.zeros(bodies.members))
         self.bad = self.machine.put(np.ascontiguousarray(arrays.first_bad, np.int64))
         self.doubt = self.machine.put(np.zeros(1, np.int32))
-        #: Whether h·v̇ at the places of the state is known, and whether its velocities and its potentials are.
+        #: True if h·v̇ at the places of the state is known, and True if its velocities and its potentials are.
         self.fresh = bodies.known is not None and bodies.known.tobytes() == places.tobytes()
         self.finished = self.has_wells = False
         self.looks = bool((arrays.first_bad < 0).any())
@@ -378,7 +378,7 @@ class _Run:
         self.call("totals", bodies.members, np.int64(bodies.members), n, bodies.parts, bodies.energies)
 
     def keep(self, dv: Any, v: Any, y: Any) -> None:
-        """What the control does to a rate, or to a state."""
+        """Apply the control to a rate, or to a state."""
         bodies, h = self.bodies, np.float64(self.plan.dt)
         self.sum_up(v, dv)
         numbers = bodies.energies, bodies.gains, bodies.targets

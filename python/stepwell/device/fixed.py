@@ -118,7 +118,7 @@ class _Run:
         self.now, self.next = rooms.put("now", before), rooms.room("next", before.nbytes)
         self.bad = rooms.put("bad", np.ascontiguousarray(arrays.first_bad, np.int64))
         self.saved = [rooms.room(name, 0) for name in SAVED]
-        #: What reduces the states after every so many steps; without one they are saved.
+        #: Observer that reduces the states after every so many steps; without one they are saved.
         self.observer: Observer | None = plan.observer
         self.every, self.reduced, self.last_t = plan.every, None, np.nan
         if self.observer is not None:
@@ -209,7 +209,7 @@ class _Run:
         self.now, self.next = self.next, self.now
 
     def of_observer(self) -> tuple[Any, ...]:
-        """What the steps take last if they observe."""
+        """The last arguments of the steps if they observe."""
         if self.observer is None:
             return ()
         return np.int32(not np.isnan(self.last_t)), np.float64(self.last_t), self.reduced
@@ -298,7 +298,7 @@ def _kernels(stages: Stages, observer: Observer | None) -> str:
     load = [f"s{i} = state[{i} * members + g];" for i in range(n)]
 
     def beside(name: str, k: str) -> list[str]:
-        """What a stage beside the steps needs at step k, and its body."""
+        """The statements that a stage beside the steps needs at step k, and its body."""
         text = texts[name]
         return [f"const double t = t0 + (double)({k}) * h; (void)t;", *text.member, *text.moment, *text.body]
 

@@ -59,7 +59,7 @@ def _begun(dim: int, *names: str) -> list[str]:
     return [f"real {name}{c} = -0.0;" for name in names for c in range(dim)]
 
 
-#: What stands before each text: its numbers, and what puts one of a place where the forces read it.
+#: Text before each of the texts: its numbers, and the function that puts one of a place where the forces read it.
 BEFORE = f"""{HEAD}{TYPES[False]}
 static inline void put_place(real x, long g, int all, int n, __global const int *ranks, __global real *places,
                              __global real *round) {{
@@ -187,7 +187,7 @@ def _nearest(dim: int) -> str:
     return "\n".join(lines)
 
 
-#: What is around: a force from outside, and where members have diverged.
+#: Kernels around the steps: a force from outside, and where members have diverged.
 AROUND = """
 __kernel void pushed(const long count, __global const real *restrict push, __global real *restrict out) {
 const long g = get_global_id(0);

@@ -1,4 +1,4 @@
-"""What keeps the energy of many bodies on a device: the reference's controls and projections, with symbols, as kernels."""
+"""Energy controls of many bodies on a device: the reference's controls and projections, with symbols, as kernels."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from ..model.controls import EnergyControl, Projection
 from .forces import SUMS
 from .printer import Printer
 
-#: What a control reads of a number of a member: its own and the member's.
+#: Numbers that a control reads for a number of a member: its own and the member's.
 NAMES = ("dv", "v", "y", "along_v", "along_y", "kinetic", "energy", "square", "tally", "h", "gain", "target")
 
 
@@ -31,17 +31,17 @@ class _Bodies:
 
 
 def is_known(control: Any) -> bool:
-    """Whether a control is one of those of energies."""
+    """True for an energy control or a projection."""
     return isinstance(control, EnergyControl | Projection)
 
 
 def pushes(control: Any) -> bool:
-    """Whether it acts in the stages of a step; else after it."""
+    """True if a control acts in the stages of a step; else it acts after the step."""
     return isinstance(control, EnergyControl) and not control.between
 
 
 def moves_places(control: Any) -> bool:
-    """Whether it changes coordinates."""
+    """True if a control changes coordinates."""
     return isinstance(control, Projection) and control.way != "scaling"
 
 

@@ -1,4 +1,4 @@
-"""What devices there are, and what each can promise."""
+"""Listing of the available devices, and of what each can promise."""
 
 from __future__ import annotations
 

@@ -126,17 +126,17 @@ class Machine:
 
     @property
     def is_cpu(self) -> bool:
-        """Whether it is a CPU."""
+        """True if the device is a CPU."""
         return bool(self.device.type & self.cl.device_type.CPU)
 
     @property
     def has_doubles(self) -> bool:
-        """Whether it computes in float64."""
+        """True if the device computes in float64."""
         return bool(self.device.double_fp_config)
 
     @property
     def rounds_single(self) -> bool:
-        """Whether it can round quotients and roots of float32 correctly."""
+        """True if the device can round quotients and roots of float32 correctly."""
         return bool(self.device.single_fp_config & self.cl.device_fp_config.CORRECTLY_ROUNDED_DIVIDE_SQRT)
 
     @property

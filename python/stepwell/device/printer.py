@@ -13,7 +13,7 @@ from ..reference.bits import DOUBLE, SINGLE
 #: The operations of a body and the places of its results, as the core returns them.
 Body = tuple[Sequence[tuple[str, Sequence[int], int]], Sequence[int]]
 
-#: What stands before all kernels: no product is contracted with a sum.
+#: Text before all kernels: no product is contracted with a sum.
 HEAD = """#pragma OPENCL EXTENSION cl_khr_fp64 : enable
 #pragma OPENCL FP_CONTRACT OFF
 """

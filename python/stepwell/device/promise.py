@@ -1,4 +1,4 @@
-"""What a device does with the bits of numbers: a test of some milliseconds at its first use in a process.
+"""Test of a device's rounding, which takes some milliseconds at its first use in a process.
 
 The bits of a run are those of the core if sums, products, quotients, roots and fused multiply-adds are rounded to the nearest
 number, if subnormal numbers are kept, and if no product is contracted with a sum. OpenCL lets a device do otherwise.

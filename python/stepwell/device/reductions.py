@@ -1,4 +1,4 @@
-"""What a kernel does with an observed state in place of saving it: it keeps a few numbers of each member on the device.
+"""Reductions of observed states by a kernel, in place of saving them: it keeps a few numbers of each member on the device.
 
 An ``Observer`` has the reductions of a run, prints what kernels do with a state, and has the numbers in the end. Its text is
 between that of the steps: in it the numbers of the observed state are ``q0``, ``q1``, …, v before y; those of recorded
@@ -16,7 +16,7 @@ import numpy as np
 
 from ..base.arrays import Array
 
-#: What a kernel that observes takes last.
+#: Last argument of a kernel that observes.
 ARGUMENTS = "__global double *restrict reduced"
 
 
@@ -39,7 +39,7 @@ class Extremes(NamedTuple):
         return ()
 
     def initial(self) -> list[str]:
-        """What results are before the first state."""
+        """The results before the first state."""
         return ["INFINITY"] * len(self.rows) + ["-INFINITY"] * len(self.rows)
 
     def see(self, kept: list[str], now: Callable[[int], str], places: list[str]) -> list[str]:
@@ -68,7 +68,7 @@ class Sums(NamedTuple):
         return self.rows
 
     def initial(self) -> list[str]:
-        """What results are before the first state."""
+        """The results before the first state."""
         return ["0.0"] * len(self.rows)
 
     def see(self, kept: list[str], now: Callable[[int], str], places: list[str]) -> list[str]:
@@ -108,7 +108,7 @@ class Passages(NamedTuple):
         return (*range(self.states), *([] if self.row < self.states else [self.row]))
 
     def initial(self) -> list[str]:
-        """What results are before the first state: only the number of passages stays in a variable."""
+        """The results before the first state: only the number of passages stays in a variable."""
         return ["0.0"]
 
     def see(self, kept: list[str], now: Callable[[int], str], places: list[str]) -> list[str]:
@@ -159,7 +159,7 @@ class Observer:
 
     @property
     def key(self) -> Any:
-        """What its text depends on: named tuples of different kinds are equal if their numbers are."""
+        """The key of its text, with the types: named tuples of different kinds are equal if their numbers are."""
         return tuple((type(each), each) for each in self._reductions)
 
     @property

@@ -36,7 +36,7 @@ def check_length(model: Any) -> None:
 
 
 class Text(NamedTuple):
-    """What is printed of a stage.
+    """The printed parts of a stage.
 
     Attributes:
         uniforms: statements that compute its uniforms, into ``uniforms``.
@@ -167,7 +167,7 @@ class Stages:
 
     @property
     def head(self) -> str:
-        """What stands before the kernels."""
+        """The text before the kernels."""
         return HEAD + TYPES[self.single] + SAMPLES + (READING if self.reader.lines else "")
 
 
@@ -247,13 +247,13 @@ class Numbers:
         )
 
     def _of_reader(self, machine: Machine, reader: Reader, size: int) -> list[Any]:
-        """What is read, and room for the values of so many bytes each; any arrays where all is printed."""
+        """The arrays that are read, and room for the values of so many bytes each; any arrays where all is printed."""
         if not reader.lines:
             return [self.sources] * 3
         return [*map(machine.put, reader.arrays()), machine.room(reader.places * size)]
 
 
-#: What every kernel takes first.
+#: First arguments of every kernel.
 ARGUMENTS = (
     "const long members, __global const double *restrict sources, __global const real *restrict uniforms, "
     "__global const real *restrict params, __global const real *restrict samples, __global const long *restrict offsets, "

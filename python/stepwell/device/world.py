@@ -94,7 +94,7 @@ class World:
         return self._of_rows().index(name)
 
     def _of_now(self) -> Numbers | bodies.Bodies:
-        """What the system is made of, on the device."""
+        """The system's numbers on the device."""
         if self._numbers is None:
             if isinstance(self._on_device, bodies.Bodies):
                 self._on_device.take(dict(zip(self._of_rows(), self._rows, strict=True)))
@@ -143,7 +143,7 @@ class World:
         return saved_v.reshape(-1), saved_y.reshape(-1), held
 
     def _is_moved(self) -> bool:
-        """Whether the arrays are not what is held."""
+        """True if the arrays differ from what was last written."""
         now = self._v, self._y
         return self._written is None or any(a.tobytes() != b.tobytes() for a, b in zip(now, self._written, strict=True))
 
@@ -171,7 +171,7 @@ class World:
             self._written = self._v.copy(), self._y.copy()
 
     def memory(self) -> Array:
-        """What a sampled controller remembers, by rows."""
+        """The memory of a sampled controller, by rows."""
         return self._held[len(self._held) - self._memory :].reshape(-1).copy()
 
     def remember(self, memory: Array) -> None:

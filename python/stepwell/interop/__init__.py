@@ -1,1 +1,1 @@
-"""What connects stepwell with other programs: files, tables, SciPy's interface, arrays of other libraries."""
+"""Connections with other programs: files, tables, SciPy's interface, arrays of other libraries."""

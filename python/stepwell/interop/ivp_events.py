@@ -55,7 +55,7 @@ class Event:
         return float(value.reshape(-1)[0])
 
     def occurs(self, before: float, after: float) -> bool:
-        """Whether the function has a zero between these values at both ends of a step, in its ``direction``."""
+        """True if the function has a zero between these values at both ends of a step, in its ``direction``."""
         grows, falls = before <= 0.0 <= after, before >= 0.0 >= after
         return (grows and self.direction >= 0.0) or (falls and self.direction <= 0.0)
 

@@ -11,7 +11,7 @@ from ..model.methods import Method, for_stiff
 from ..model.methods import method as find_method
 from ..model.methods import methods as every_method
 
-#: What is taken if no method is named. SciPy then takes RK45, which mostly costs more.
+#: Method if none is named. SciPy then takes RK45, which mostly costs more.
 DEFAULT = "dop853"
 
 #: Methods for stiff equations that are not here. With a warning, that of the tolerance is taken for them.

@@ -59,7 +59,7 @@ class Trajectory:
 
     @property
     def goes_on(self) -> bool:
-        """Whether it has come neither to its end nor to where no step is possible."""
+        """True until it has come to its end or to where no step is possible."""
         return self.status in (adaptive.BUDGET, engine.FULL)
 
     @property
@@ -138,7 +138,7 @@ class Trajectory:
         return within_steps(plan_of, lambda _: self._pacing, paces, (member, since, ends), times, start)[1]
 
     def loses_to(self, requested: Callable[[], Request]) -> bool:
-        """Whether another method would have come as far with a part of the attempts: see ``PART``."""
+        """True if another method would have come as far with a part of the attempts: see ``PART``."""
         attempts = int(self._paces[engine.COUNTS][:2].sum()) // PART
         if self.status != adaptive.BUDGET or PART * attempts < BEFORE_A_CHECK or self._waypoints is None:
             return False
@@ -148,7 +148,7 @@ class Trajectory:
         return other.advance() and other.reached >= self.reached
 
     def stiffness(self) -> str:
-        """That stability held down many steps, and what to do, in words; "" if it did not."""
+        """A warning that stability held down many steps, with advice; "" if it did not."""
         if self._waypoints is None or not may_be_stiff(int(self._paces[engine.COUNTS.start]), len(self._last)):
             return ""
         plan, paces, status = self._plan, self._paces, np.asarray(adaptive.OK if self.goes_on else self.status)

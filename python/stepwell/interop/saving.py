@@ -157,7 +157,7 @@ def _current(place: Path, text: str, version: int) -> str:
 
 
 def _is_ours(zarr: Any, place: Path) -> bool:
-    """Whether a folder has a run, so that another run may replace it."""
+    """True if a folder has a run, so that another run may replace it."""
     try:
         return ABOUT in zarr.open_group(str(place), mode="r").attrs
     except Exception:  # anything else is not replaced

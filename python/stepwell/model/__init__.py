@@ -1,1 +1,1 @@
-"""What a user describes: systems, own equations, inputs, controls, surfaces, methods."""
+"""Descriptions of models: systems, own equations, inputs, controls, surfaces, methods."""

@@ -42,7 +42,7 @@ class Part(Immutable, ValueEquality, ABC):
         return
 
     def beside(self, other: Any) -> Part:
-        """What is around a system with this part that had another of its kind, or None: this part alone."""
+        """Combine with another part of its kind that a system has, or None; by default this part replaces it."""
         return self
 
     @property
@@ -57,7 +57,7 @@ class Part(Immutable, ValueEquality, ABC):
 
     @property
     def keeps_energy(self) -> bool:
-        """Whether the energy of the system stays constant with it."""
+        """True if the energy of the system stays constant with this part."""
         return False
 
     @abstractmethod
@@ -134,7 +134,7 @@ class StickFriction(Part):
 
     @property
     def keeps_energy(self) -> bool:
-        """Whether the friction is zero for all members."""
+        """True if the friction is zero for all members."""
         return not self.limit.any()
 
     def repr_arguments(self) -> list[str]:

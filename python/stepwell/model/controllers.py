@@ -151,7 +151,7 @@ class ControllerDefinition:
 
 
 def _arguments(function: FunctionType) -> tuple[tuple[str, ...], dict[str, Any], dict[str, Any]]:
-    """What a function takes beside the time, and names and defaults of its state and of its parameters."""
+    """The arguments of a function beside the time, and names and defaults of its state and of its parameters."""
     signature = inspect.signature(function)
     arguments = list(signature.parameters.values())
     names = [each.name for each in arguments]
@@ -272,7 +272,7 @@ class Controller(Part):
 
     @property
     def reads_outputs(self) -> bool:
-        """Whether one of them takes the outputs of a linear system."""
+        """True if one of them takes the outputs of a linear system."""
         return any(each.definition.reads == ("z",) for each in self.each)
 
     @property
@@ -364,7 +364,7 @@ class Controller(Part):
 
     @property
     def loop_key(self) -> tuple[Any, ...]:
-        """What is the same of controllers that remember the same."""
+        """The key of the layout of its memory, equal for controllers that remember the same."""
         return tuple((each.definition, each.sets, each.timing) for each in self.each)
 
     @property
@@ -377,7 +377,7 @@ class Controller(Part):
         return [0]
 
     def targets(self, system: System) -> list[Target]:
-        """What it sets."""
+        """The parameters that it sets."""
         return [target(system, name) for name in self.sets]
 
     def _counts(self, system: System) -> tuple[int, int]:
@@ -419,7 +419,7 @@ class Controller(Part):
         return {each.name: [next(places) for _ in range(prod(each.shape))] for each in self.targets(system)}
 
     def held(self, system: System, name: str, memory: list[Any]) -> Any:
-        """What it holds between two steps for a parameter that it sets: the axes of that, then the batch."""
+        """The value that it holds between two steps for a parameter that it sets: the axes of that, then the batch."""
         block = np.stack(np.broadcast_arrays(*(memory[i] for i in self.held_places(system)[name])))
         return block.reshape((*system.recorded_shapes()[name], *block.shape[1:]))
 
@@ -429,7 +429,7 @@ class Controller(Part):
         return {"controller.last": np.asarray(steps - 1.0)} | ({"controller.later": np.asarray(float(later))} if later else {})
 
     def for_core(self, system: System, places: dict[str, int], *, single: bool = False) -> list[tuple[str, Any]]:
-        """What the core takes beside its parameters; ``places`` has the number of each parameter's first row."""
+        """The values that the core takes beside its parameters; ``places`` has the number of each parameter's first row."""
         timing, tape = self._timing(), _core.Tape(single=single)
         made = [self._traced(system, tape, places) for _ in range(2)]
         if [each.id for each in made[0]] != [each.id for each in made[1]]:
@@ -451,7 +451,7 @@ class Controller(Part):
         return hashlib.sha256(repr(tape.operations(made)).encode()).hexdigest()
 
     def _traced(self, system: System, tape: _core.Tape, places: dict[str, int]) -> list[_core.Symbol]:
-        """What it computes from symbols; its parameters begin at these."""
+        """The results computed from symbols; its parameters begin at ``places``."""
         state = map(tape.state, count())
         blocks = [_symbols(shape, state) for shape in (system.v_shape, system.y_shape)]
         memory = [next(state) for _ in range(self._counts(system)[1])]
@@ -501,7 +501,7 @@ class Controller(Part):
         return numbers
 
     def at_start(self, system: System, batch: Shape) -> Array:
-        """What it remembers at the start: rows of one number for each member."""
+        """The memory at the start: rows of one number for each member."""
         rows = [np.zeros(()), *self._states_at_start(system, batch)]
         parameters, timing = system.own_parameters(batch), self._timing()
         before = []
@@ -586,7 +586,7 @@ class Controllers(Controller):
         return each._own(own)
 
     def with_values(self, values: dict[str, Any]) -> Controller:
-        """These controllers with other numbers for some parameters."""
+        """Return these controllers with other numbers for some parameters."""
         own = {
             id(each): {name: values[known] for known, (of, name) in self.tunable.items() if of is each and known in values}
             for each in self.each
@@ -598,7 +598,7 @@ class Controllers(Controller):
         return changed(self, each=tuple(each.member(one) for each in self.each))
 
     def over_steps(self, dt: float) -> Controller:
-        """These controllers with their times in steps of this length; within, those of each in samples of the whole.
+        """Return these controllers with their times in steps of this length; within, those of each in samples of the whole.
 
         Raises:
             ArgumentError: if they are no whole numbers of steps.
@@ -611,7 +611,7 @@ class Controllers(Controller):
 
     @property
     def loop_key(self) -> tuple[Any, ...]:
-        """What is the same of controllers that remember the same."""
+        """The key of the layout of its memory, equal for controllers that remember the same."""
         return (self.timing, *super().loop_key)
 
     @property
@@ -638,7 +638,7 @@ class Controllers(Controller):
         return " ".join(each.digest(system) for each in self.each)
 
     def _run(self, system: System, t: Any, v: Any, y: Any, state: list[Any], parameters: dict[str, Any]) -> list[Any]:
-        """What each puts out at a sample of the whole, and what each remembers then."""
+        """The outputs of each controller at a sample of the whole, then the memory of each."""
         numbers: list[Any] = []
         following: list[Any] = []
         first = self._first(system)

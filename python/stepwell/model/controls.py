@@ -68,7 +68,7 @@ class EnergyControl(OfEnergy):
         self.gain = None if gain is None else checks.not_negative("gain", gain)
         self.relative = None if relative is None else checks.not_negative("relative", relative)
         self.target = None if target is None else checks.numbers("target", target)
-        #: Whether it pushes between steps: ``integrate`` sets it for methods in whose stages v and y belong to different times.
+        #: True if it pushes between steps: ``integrate`` sets it for methods in whose stages v and y belong to different times.
         self.between = False
 
     @property

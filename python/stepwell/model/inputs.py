@@ -123,7 +123,7 @@ class Sampled(Immutable, ValueEquality):
 
     @property
     def constant(self) -> bool:
-        """Whether all samples are equal."""
+        """True if all samples are equal."""
         return bool((self.values == self.values[0]).all())
 
     @property

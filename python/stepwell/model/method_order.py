@@ -154,7 +154,7 @@ def _errors(programs: Programs, acceleration: bool) -> tuple[int, int, int]:
 
 
 def _grows(programs: Programs) -> bool:
-    """Whether steps grow without rates, so that no step is short enough (a method that is not zero-stable)."""
+    """True if steps grow without rates, so that no step is short enough (a method that is not zero-stable)."""
 
     class Rest:
         def dv(self, t: float, v: Array, y: Array) -> Array:

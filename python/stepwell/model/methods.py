@@ -63,21 +63,21 @@ class Method(Immutable):
     evaluations: int
     #: Function evaluations of an attempt at an adaptive step; 0 if it does not estimate its error.
     attempt_evaluations: int
-    #: Those of its continuous extension, by which states within a step of a run with a tolerance are found; 0 without one.
+    #: Evaluations of its continuous extension, by which states within a step of a run with a tolerance are found; 0 without one.
     extension_evaluations: int
     #: The family of methods to which it belongs.
     family: str
-    #: Whether its steps sum the Taylor series of the solution. With a tolerance it then chooses the order that costs least.
+    #: True if its steps sum the Taylor series of the solution. With a tolerance it then chooses the order that costs least.
     has_series: bool
-    #: Whether a step is the exact solution of a linear system, by the exponential of its matrix.
+    #: True if a step is the exact solution of a linear system, by the exponential of its matrix.
     is_exact: bool
-    #: Whether a step solves equations, of any number of unknowns, with derivatives of the rates.
+    #: True if a step solves equations, of any number of unknowns, with derivatives of the rates.
     is_implicit: bool
     #: The undamped oscillator is stable for Φ = ω₀·dt below this limit; 0 means never.
     limit: float
     #: Times within a step at which rates are evaluated, as fractions of the step.
     nodes: tuple[float, ...]
-    #: Whether it needs a second-order system whose forces do not depend on the velocity.
+    #: True if it needs a second-order system whose forces do not depend on the velocity.
     needs_acceleration: bool
     #: The name of what it carries between steps in place of v, or None.
     carry: str | None
@@ -110,7 +110,7 @@ class Method(Immutable):
 
     @property
     def begins(self) -> bool:
-        """Whether a run begins with more than its state: with what the method carries in place of v, or keeps beside it."""
+        """True if a run begins with more than its state: with what the method carries in place of v, or keeps beside it."""
         return self.carry is not None or bool(self.kept)
 
     def kept_numbers(self, n_v: int, n_y: int) -> int:
@@ -119,22 +119,22 @@ class Method(Immutable):
 
     @property
     def has_derivatives(self) -> bool:
-        """Whether a step takes derivatives of the rates, so that it goes over symbols only."""
+        """True if a step takes derivatives of the rates, so that it goes over symbols only."""
         return self.has_series or self.is_implicit
 
     @property
     def splits(self) -> bool:
-        """Whether it moves bodies by Kepler's motions, so that a step of them is one tape."""
+        """True if it moves bodies by Kepler's motions, so that a step of them is one tape."""
         return not self.is_exact and any(name == "drift of y" for name, _, _ in _core.program(self.key)[0])
 
     @property
     def takes_derivatives_by_time(self) -> bool:
-        """Whether a step takes the derivatives of rates by the time, and with them those of inputs."""
+        """True if a step takes the derivatives of rates by the time, and with them those of inputs."""
         return self.has_series or (not self.is_exact and any(name == "v by time" for name, _, _ in _core.program(self.key)[0]))
 
     @property
     def is_always_stable(self) -> bool:
-        """Whether steps of any length are stable where a motion does not grow."""
+        """True if steps of any length are stable where a motion does not grow."""
         return self.limit == math.inf
 
     @property

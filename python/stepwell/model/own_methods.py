@@ -127,7 +127,7 @@ def evaluations(program: Program) -> int:
 
 
 def kinds(program: Program) -> list[bool]:
-    """Whether each result of a program without kept blocks is one of velocities."""
+    """A flag for each result of a program without kept blocks: True for one of velocities."""
     of_v: list[bool] = []
     for name, of, _ in program.operations:
         of_v.append(name in ("v", "dv", "velocity") or (name in ("add", "subtract", "scale") and of_v[of[0]]))

@@ -64,7 +64,7 @@ def rows(values: Array, batch: Shape, own: int | None = None) -> Array:
 
 
 def is_common(values: Array, own: int) -> bool:
-    """Whether all members share these numbers."""
+    """True if all members share these numbers."""
     return all(size == 1 or stride == 0 for size, stride in zip(values.shape[own:], values.strides[own:], strict=True))
 
 

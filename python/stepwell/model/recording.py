@@ -18,7 +18,7 @@ from ..base.checks import short
 from ..errors import ArgumentError, DTypeError, ShapeError
 from ..reference.program import Operation, Program
 
-#: What a block is called in messages.
+#: Names of the blocks in messages.
 KINDS = {True: "velocities", False: "coordinates"}
 
 

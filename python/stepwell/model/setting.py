@@ -16,7 +16,7 @@ from .inputs import Sampled, Sinusoid
 from .parameters import CoreParameters, aligned
 from .systems import System
 
-#: What to do instead of setting what cannot be set.
+#: Advice where a value cannot be set.
 ANEW = "make another World that goes on from here, World(system, method, resume=world)"
 #: The arguments of controls that are numbers, with the row of the core and what each number is above.
 OF_CONTROLS: dict[type[Any], dict[str, tuple[str, float]]] = {

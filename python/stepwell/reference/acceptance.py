@@ -1,10 +1,10 @@
-"""What a step must satisfy to be accepted."""
+"""Conditions for accepting a step."""
 
 from typing import NamedTuple
 
 
 class Acceptance(NamedTuple):
-    """What a step must satisfy to be accepted.
+    """The conditions that a step must satisfy to be accepted.
 
     Attributes:
         groups: for each number of v, then of y, the group to which it belongs, counted from 0 without gaps, those of v first. The

@@ -1,4 +1,4 @@
-"""What is around a system: parts that wrap it one after the other, each a system itself, scaled to the step."""
+"""Parts around a system, which wrap it one after the other, each a system itself, scaled to the step."""
 
 from collections.abc import Callable, Iterable
 from typing import Any

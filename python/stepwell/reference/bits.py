@@ -90,12 +90,12 @@ PRECISIONS = PerPrecision(DOUBLE, SINGLE)
 
 
 def is_symbol(x: Any) -> bool:
-    """Whether this is a value on a tape."""
+    """True for a value on a tape."""
     return hasattr(x, "and_bits")
 
 
 def is_single(x: Any) -> bool:
-    """Whether these are symbols on a tape of float32."""
+    """True for symbols on a tape of float32."""
     if not isinstance(x, np.ndarray):
         return bool(getattr(x, "single", False))
     return x.dtype == object and any(getattr(each, "single", False) for each in x.flat)
@@ -113,17 +113,17 @@ def _call(method: str, x: Any, *others: Any) -> Any:
 
 
 def less(a: Any, b: Any) -> Any:
-    """Whether a < b. For a > b exchange them."""
+    """True where a < b. For a > b exchange them."""
     return np.frompyfunc(operator.lt, 2, 1)(a, b) if _objects(a, b) else np.less(a, b)
 
 
 def at_most(a: Any, b: Any) -> Any:
-    """Whether a ≤ b."""
+    """True where a ≤ b."""
     return np.frompyfunc(operator.le, 2, 1)(a, b) if _objects(a, b) else np.less_equal(a, b)
 
 
 def equal(a: Any, b: Any) -> Any:
-    """Whether a = b; false of a NaN, as all comparisons are."""
+    """True where a = b; false of a NaN, as all comparisons are."""
     return _call("equals", a, b) if _objects(a) else np.equal(a, b)
 
 

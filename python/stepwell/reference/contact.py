@@ -42,7 +42,7 @@ def magnitudes(a: Any, b: Any) -> Any:
 
 
 class Step(NamedTuple):
-    """What a step of the method did to the points: the states before and after, the increment of v, and the lag."""
+    """The effect of a step of the method on points: the states before and after, the increment of v, and the lag."""
 
     v0: Vector
     y0: Vector
@@ -71,7 +71,7 @@ class Place(NamedTuple):
 
 
 class Change(NamedTuple):
-    """What contact makes of a point.
+    """The state of a point after contact.
 
     Attributes:
         speed: the velocity along the normal.
@@ -89,7 +89,7 @@ class Change(NamedTuple):
 
 
 class Surface(ABC):
-    """What planes and spheres have in common; ``friction`` None means that there is none."""
+    """The base of planes and spheres; ``friction`` None means that there is none."""
 
     is_curved = False
 
@@ -106,7 +106,7 @@ class Surface(ABC):
 
     @abstractmethod
     def push(self, y: Vector) -> Vector:
-        """What a one-sided spring takes from an increment of v."""
+        """The part of an increment of v that a one-sided spring takes away."""
 
     @abstractmethod
     def depth_of(self, y: Vector) -> Any:

@@ -1,4 +1,4 @@
-"""What keeps the energy near its target (§12, Appendix D): a push −g·v in stages or between steps, or a projection after a step.
+"""Control of the energy (§12, Appendix D): a push −g·v in stages or between steps, or a projection after a step.
 
 Both wrap a system that has ``energies``, and are a system themselves. Energies are multiplied by h.
 """
@@ -29,7 +29,7 @@ class Conserving(Scaled, Protocol):
 
 
 class EnergyKeeping(Around):
-    """What both have: the target, and the sum of the changes of the energy."""
+    """The base of control and projection: the target, and the sum of the changes of the energy."""
 
     #: h times that sum.
     work: Any = 0.0

@@ -40,7 +40,7 @@ MOST_HALVINGS_FROM_ZERO = 60
 
 #: From some members and shares of their steps to g, v and y there; the axis of the members comes last.
 Trial = Callable[[Any, Array], tuple[Array, Array, Array]]
-#: The same with the slope of g along the motion, over the time of the whole step, behind g.
+#: As ``Trial``, with the slope of g along the motion, over the time of the whole step, behind g.
 Look = Callable[[Any, Array], tuple[Array, Array, Array, Array]]
 
 
@@ -81,7 +81,7 @@ def joined(parts: Sequence[Parts]) -> Parts:
 
 
 def may_change(before: Array, g: Array) -> Any:
-    """Whether g may change its sign in each step, once or twice: shape (steps, members).
+    """True where g may change its sign in a step, once or twice: shape (steps, members).
 
     Args:
         before: g at the state before the first step, NaN where it is not known, shape (members,).
@@ -112,7 +112,7 @@ def sides(parts: Parts) -> tuple[Array, Array]:
 
 
 def bends(parts: Parts) -> Any:
-    """Whether these parts may have more zeros than the signs at their ends show.
+    """True where these parts may have more zeros than the signs at their ends show.
 
     They have none if the control points of the cubic with the same values and slopes are on one side of zero.
     """

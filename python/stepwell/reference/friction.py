@@ -25,7 +25,7 @@ class Separate:
         return np.asarray(bits.where(bits.less(moved, -limit), f + limit, forward))
 
     def stops(self, v: Array, f: Array) -> Any:
-        """Whether friction stops it, and can hold it there."""
+        """True where friction stops it, and can hold it there."""
         return self._within(v + f) & self._within(f)
 
     def stopped(self, v: Array, stops: Any) -> Array:
@@ -82,7 +82,7 @@ class OnOne(Separate):
         return self._with(super().reduced(v[self.at], f[self.at]), f if self.along is None else f + self.along * push)
 
     def stops(self, v: Array, f: Array) -> Any:
-        """Whether friction stops it, and can hold it there."""
+        """True where friction stops it, and can hold it there."""
         return super().stops(v[self.at], f[self.at])
 
     def stopped(self, v: Array, stops: Any) -> Array:

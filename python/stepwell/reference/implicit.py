@@ -1,4 +1,4 @@
-"""What implicit methods need of a system: its Jacobian J at the start of a step, and the solution of (M − γhJ)·x = r.
+"""Linear algebra of implicit methods: the Jacobian J at the start of a step, and the solution of (M − γhJ)·x = r.
 
 M is the mass matrix of the system, or that of units. The derivatives are the coefficients of first order of the rates' Taylor
 series along one number of the state, or along the time.

@@ -30,7 +30,7 @@ class Joined:
         self.d = [[to - at for to, at in zip(y[b], y[a] if a < n else rods.anchors[a - n], strict=True)] for a, b in rods.rods]
 
     def factors(self) -> Factors:
-        """Those of the rods' equations."""
+        """The factors of the rods' equations."""
         return factored(self.rods.matrix(self.d))
 
     def squares(self) -> list[Any]:
@@ -46,7 +46,7 @@ class Joined:
         return rates
 
     def pushed(self, pulls: list[Any], points: int) -> Column:
-        """What pulls of the rods do to each point; None for those that do not feel any."""
+        """The sum of the rods' pulls on each point; None for those that do not feel any."""
         sums: Column = [None] * points
         for (a, b), d, pull in zip(self.rods.rods, self.d, pulls, strict=True):
             if pull is None:

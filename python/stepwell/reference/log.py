@@ -13,7 +13,7 @@ from .marks import differentiable
 
 
 class Constants(NamedTuple):
-    """Those of one precision.
+    """Constants of one precision.
 
     Attributes:
         ln2: ln 2; k times the first part, of 33 or 15 bits, is exact.

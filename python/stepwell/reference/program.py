@@ -75,7 +75,7 @@ class Programs(NamedTuple):
 
     @property
     def estimates(self) -> bool:
-        """Whether it estimates the error of a step."""
+        """True if it estimates the error of a step."""
         return not self.kept and len(self.whole.results) > 2
 
     def step(self, s: Scaled, t: float, h: float, v: Array, y: Array, *kept: Array) -> Any:

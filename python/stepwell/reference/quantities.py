@@ -1,4 +1,4 @@
-"""What can be recorded of a state, beside v and y."""
+"""Quantities that can be recorded of a state, beside v and y."""
 
 from __future__ import annotations
 

@@ -40,7 +40,7 @@ def polynomials(A: Array, B: Array, C: Array, D: Array) -> tuple[Array, Array]:
 
 
 def _remainder(trace: Twice, quotient: Array, k: int) -> Array:
-    """What −trace/k has beyond its first number."""
+    """The remainder of −trace/k beyond its first number."""
     exact: Twice = product(_one(quotient), _one(np.full_like(quotient, k)))
     return np.asarray((-(trace[0] + exact[0][0, 0]) - (trace[1] + exact[1][0, 0])) / k)
 

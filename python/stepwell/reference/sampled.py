@@ -32,7 +32,7 @@ class Loop(NamedTuple):
     later: Any = None
 
     def step(self, t: Any, v: Any, y: Any, memory: list[Any]) -> tuple[list[Any], list[Any]]:
-        """What it sets for a step from this state, and what it remembers then."""
+        """The values set for a step from this state, and the memory then."""
         steps = memory[0]
         behind = (self.waiting + 1) * self.sets + (0 if self.later is None else self.sets)
         own = memory[1 : len(memory) - behind]
@@ -50,7 +50,7 @@ class Loop(NamedTuple):
         return out, [*remembered, *(held if self.later is not None else [])]
 
     def held(self, memory: list[Any]) -> list[Any]:
-        """What stands between two steps."""
+        """The values held between two steps."""
         if self.later is not None:
             return memory[-self.sets :]
         first = len(memory) - (self.waiting + 1) * self.sets

@@ -199,7 +199,7 @@ class Series:
         return NotImplemented if isinstance(other, np.ndarray) else Truth(self.book, _start(other) <= self.terms[0])
 
     def equals(self, other: Any) -> Truth:
-        """Whether both are equal at the start of the step."""
+        """True where both are equal at the start of the step."""
         start, other = self.terms[0], _start(other)
         return Truth(self.book, start.equals(other) if hasattr(start, "equals") else np.equal(start, other))
 
@@ -263,7 +263,7 @@ def at_start(x: Any) -> Any:
 
 
 def among(values: Sequence[Any]) -> bool:
-    """Whether any of these is a series, or an array with one."""
+    """True if any of these is a series, or an array with one."""
     return any(
         isinstance(each, Series)
         or (isinstance(each, np.ndarray) and each.dtype == object and any(isinstance(item, Series) for item in each.flat))
@@ -272,7 +272,7 @@ def among(values: Sequence[Any]) -> bool:
 
 
 def _is(x: Any, number: float) -> bool:
-    """Whether x is this number, its sign included."""
+    """True if x is this number, its sign included."""
     return isinstance(x, (float, int)) and float(x).hex() == number.hex()
 
 
@@ -361,7 +361,7 @@ def _identity(x: Any) -> Any:
 
 
 def has_rule(mark: Mark) -> bool:
-    """Whether a marked value is treated as a function. Roots and squares are operations like others."""
+    """True if a marked value is treated as a function. Roots and squares are operations like others."""
     return mark.name == LOWERED or (mark.name in rules.PARTIALS and mark.name not in ("sqrt", "square"))
 
 
@@ -401,7 +401,7 @@ def _either(truth: Any, yes: Any, no: Any) -> Any:
 
 
 def _is_zero(x: Any) -> Any:
-    """Whether a base is zero, or so small that its reciprocal overflows; its powers are zero then."""
+    """True where a base is zero, or so small that its reciprocal overflows; its powers are zero then."""
     return magnitude(at_start(x)) <= TINY
 
 
@@ -466,7 +466,7 @@ def part_of(number: Any, k: int) -> Any:
 def expanded(
     s: Any, order: int, t: Any, lengths: tuple[Any, Any], v: Any, y: Any, *, divides: bool = True
 ) -> tuple[list[tuple[Any, Any]], list[Branch]]:
-    """The same coefficients, and the branches of functions that the rates are on.
+    """The Taylor coefficients, and the branches of functions that the rates are on.
 
     ``lengths`` are the unit of time in powers of which the coefficients are, and this over the step to which ``s`` is scaled.
     """

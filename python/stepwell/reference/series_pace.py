@@ -139,7 +139,7 @@ def unit_of(step: Any) -> Any:
 
 
 def lows(v: Array, y: Array, pace: Pace) -> tuple[Array, Array]:
-    """What v and y are more than the state has."""
+    """The remainders of v and y that rounding leaves out of the state."""
     of_v = np.size(v) // max(1, prod(pace.low.shape[1:]))
     return pace.low[:of_v].reshape(np.shape(v)), pace.low[of_v:].reshape(np.shape(y))
 
@@ -221,7 +221,7 @@ def reach(
 
 
 def on_branches(branches: Sequence[Branch], share: Any, moved: Any) -> Any:
-    """Whether all functions stay on their branch within a step, or all its motion is tolerated as an error."""
+    """True where all functions stay on their branch within a step, or all its motion is tolerated as an error."""
     symbols = {each.value.terms[0].id: each for each in branches if hasattr(each.value.terms[0], "id")}
     stays = []
     for value, least, most in (symbols[place] for place in sorted(symbols)) if symbols else branches:

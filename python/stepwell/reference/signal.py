@@ -29,26 +29,26 @@ def over(window: Window, compute: Callable[..., Any], /, *arguments: Any) -> Any
 
 
 def _ways(h: Any) -> tuple[Any, Any]:
-    """What of a length leads back in time, and what leads on; one of them is zero."""
+    """The part of a length that leads back in time, and the part that leads on; one of them is zero."""
     back = bits.where(bits.less(h, 0.0), h, 0.0)
     return back, h - back
 
 
 def of_step(t: Any, h: Any, carries: bool) -> Window:
-    """That of a step from t. Rates of a method that carries something in place of v belong to the middle of their window."""
+    """The window of a step from t; its middle is the time of the rates if a method carries something in place of v."""
     back, on = _ways(h)
     length = on - back
     return (t - 0.5 * length, t + 0.5 * length, length) if carries else (t + back, t + on, length)
 
 
 def of_slot(t: Any, h: Any) -> Window:
-    """That of half a kick at t, from what a method carries to velocities and back."""
+    """The window of half a kick at t, from what a method carries to velocities and back."""
     back, on = _ways(0.5 * h)
     return t - on, t - back, on - back
 
 
 class Constant:
-    """The same value at all times."""
+    """An input with the same value at all times."""
 
     def __init__(self, value: Array) -> None:
         self.value = value
@@ -62,7 +62,7 @@ class Constant:
         return self.value
 
     def scaled(self, factor: Array) -> Constant:
-        """The same input, times a factor."""
+        """Return this input times a factor."""
         return Constant(factor * self.value)
 
 
@@ -81,7 +81,7 @@ class Sine:
         return self.amplitude * trig.sin(self.omega * t + self.phase)
 
     def scaled(self, factor: Array) -> Sine:
-        """The same input, times a factor."""
+        """Return this input times a factor."""
         return Sine(factor * self.amplitude, self.omega, self.phase)
 
 
@@ -89,7 +89,7 @@ class Held:
     """``values[i]`` from start + i·interval until the next sample; the first before, the last after."""
 
     factor: Array | None = None
-    #: Whether its values are the times at which the samples of another begin.
+    #: True if its values are the times at which the samples of another begin.
     is_times = False
 
     def __init__(self, values: Array, interval: float, start: float) -> None:
@@ -115,7 +115,7 @@ class Held:
         return np.asarray(np.take_along_axis(np.broadcast_to(rows, (len(rows), *batch)), i, axis=0)[0])
 
     def scaled(self, factor: Array) -> Held:
-        """The same input, times a factor."""
+        """Return this input times a factor."""
         other = copy(self)
         other.factor = factor
         return other
@@ -163,7 +163,7 @@ class Stepped:
         return np.asarray(before + share * (after - before))
 
     def scaled(self, factor: Array) -> Stepped:
-        """The same input, times a factor."""
+        """Return this input times a factor."""
         other = copy(self)
         other.factor = factor
         return other
@@ -197,7 +197,7 @@ class Curve:
         return result if self.factor is None else np.asarray(self.factor * result)
 
     def scaled(self, factor: Array) -> Curve:
-        """The same input, times a factor."""
+        """Return this input times a factor."""
         other = copy(self)
         other.factor = factor
         return other

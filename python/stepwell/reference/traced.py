@@ -46,7 +46,7 @@ class HeldAll(Held):
         self.value = value
 
     def sample(self, t: Any) -> Any:
-        """The same at all times."""
+        """The value, which is the same at all times."""
         return self.value
 
 
@@ -96,7 +96,7 @@ class Tracer:
         return {name: self.symbols(value, batch) for name, value in self.system.own_parameters(batch).items()}
 
     def _parts(self) -> list[Bound]:
-        """What is around the system, with symbols for its parameters, which come behind the system's own."""
+        """The parts around the system, with symbols for their parameters, which come behind the system's own."""
 
         def of(part: Any, name: str, value: Any) -> Any:
             return converted(value, lambda numbers: self._numbers(numbers, part.own_axes(name)), self._table)

@@ -26,13 +26,13 @@ def _by_parity(r: Array, s: tuple[float, ...]) -> Array:
 
 
 def _in_turn(r: Array, s: tuple[float, ...]) -> Array:
-    """The same of four terms, each of which waits for the one before."""
+    """Sin r = r + r³·(s₀ + s₁·r² + …) of four terms, each of which waits for the one before."""
     z = r * r
     return r + (r * z) * (s[0] + z * (s[1] + z * (s[2] + z * s[3])))
 
 
 class Constants(NamedTuple):
-    """Those of one precision.
+    """Constants of one precision.
 
     Attributes:
         pi: π in parts; n times each but the last is exact, for n < 2²⁰ or 2¹¹.

@@ -269,7 +269,7 @@ class Scene(ValueEquality):
         return np.stack([_relative(*both) for both in zip(lengths, self.group_scales, strict=True)])
 
     def owns(self, run: Run) -> bool:
-        """Whether a run is of this scene's system, controlled or not, and of one member; its start does not matter."""
+        """True if a run is of this scene's system, controlled or not, and of one member; its start does not matter."""
         return (
             run.system.uncontrolled.for_state_shapes(run.v[0], run.y[0]) == self.system.for_state_shapes(self.v, self.y)
             and run.status.ndim == 0

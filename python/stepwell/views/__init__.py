@@ -1,1 +1,1 @@
-"""What people see: charts, the explorer, the paper's statements, the command line."""
+"""Views for people: charts, the explorer, the paper's statements, the command line."""

@@ -31,7 +31,7 @@ PLACES = 3
 #: The most derivatives that are cached: a search for a limit needs the same ones many times.
 MAX_CACHED = 8
 
-#: Those that were derived last, by the operations of their values.
+#: Jacobians that were derived last, by the operations of their values.
 _jacobians: dict[str, Evaluation] = {}
 
 #: Up to this product of the length of a tape and the length of a state, each element of the matrix has operations of its own, and
@@ -148,7 +148,7 @@ def _rows(system: System, v: Array, y: Array) -> list[Array]:
 
 
 class Reading(NamedTuple):
-    """What rates and their derivatives depend on.
+    """The dependencies of rates and of their derivatives.
 
     Attributes:
         time: whether the rates depend on time, explicitly or by samples.
@@ -160,7 +160,7 @@ class Reading(NamedTuple):
 
 
 def reading(system: System) -> Reading:
-    """What a system's rates and their derivatives depend on, read from their tape.
+    """The dependencies of a system's rates and of their derivatives, read from their tape.
 
     Derivatives that are sums, products and roots of the state are constant if they are equal at places drawn at random: that is
     so where a square of the state has the factor 0, for example.

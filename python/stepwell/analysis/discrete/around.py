@@ -34,7 +34,7 @@ MOST_STEPS = 100_000
 
 @dataclass(frozen=True, eq=False)
 class LinearisedLoop(ValueEquality):
-    """What a small change of a system and of its controller is after a period; ``linearised_loop`` returns it.
+    """The linearisation of a system with its controller over a period; ``linearised_loop`` returns it.
 
     Attributes:
         method: the name of the method.

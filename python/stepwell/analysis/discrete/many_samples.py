@@ -1,4 +1,4 @@
-"""Whether a sampled loop grows, for many lengths of a sample at once."""
+"""Growth of a sampled loop, for many sampling intervals at once."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def scaled(system: LinearSystem, dts: Array) -> LinearSystem:
 def grow(
     plant: LinearSystem, controller: Callable[[Array], Realisation], dts: Array, delay: float, samples: int, slack: Array
 ) -> Truths:
-    """Whether loops have an eigenvalue larger than 1 by more than the slack.
+    """True for each loop that has an eigenvalue larger than 1 by more than the slack.
 
     Args:
         plant: as for ``sampled_loop``.
@@ -79,7 +79,7 @@ def grow(
 
 
 def _outside(parts: Parts, C: Array, controller: list[Array], wholes: Whole, radii: Array, places: Whole) -> list[bool]:
-    """Whether loops with much dead time have eigenvalues outside circles.
+    """True for each loop with much dead time that has an eigenvalue outside its circle.
 
     The argument of a polynomial of degree n rises by n·π along the upper half of a circle round all its roots (Cremer 1947,
     Leonhard 1944, Mikhailov 1938). The power of z that stands for the samples under way is put aside, and the others are powers

@@ -427,7 +427,7 @@ def slots_of(system: LinearSystem, method: Method, dt: float) -> tuple[Array, Ar
 def of_states(
     system: LinearSystem, method: Method, dt: float, P: Array, Q: Any, after: Any, finish: Array
 ) -> tuple[Array, Any, Any]:
-    """These matrices of slots as those of states, in the order of A.
+    """Transform matrices of slots into matrices of states, in the order of A.
 
     A state is F·(slots) + G·x: for methods that carry something in place of v, the velocity depends on the input of its time.
     """

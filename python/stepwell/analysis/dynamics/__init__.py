@@ -1,4 +1,4 @@
-"""What a system does near its states: Jacobians, equilibria, Lyapunov exponents.
+"""Dynamics of a system near its states: Jacobians, equilibria, Lyapunov exponents.
 
 All of it comes from derivatives of the tape (``stepwell.derivatives``), so it holds for any system, a user's own equations
 included.

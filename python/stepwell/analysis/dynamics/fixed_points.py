@@ -112,7 +112,7 @@ class Equilibrium(ValueEquality):
 
     @property
     def stable(self) -> bool | None:
-        """Whether small disturbances decay; None where first order does not decide it."""
+        """True if small disturbances decay; None where first order does not decide it."""
         return {"sink": True, "source": False, "saddle": False}.get(self.kind)
 
     def __repr__(self) -> str:
@@ -360,7 +360,7 @@ def _solved(sums: Sums, matrix: Array, rates: Array, zero: float = SINGULAR) -> 
 
 
 def _of_reduced(sums: Sums, matrix: Array, rates: Array, zero: float = SINGULAR) -> Array:
-    """That for the matrix of the numbers that no sum determines."""
+    """The least-squares solution for the matrix of the numbers that no sum determines."""
     rates = rates[sums.free]
     of_rows, of_columns = _units(matrix)
     stacked, right = np.moveaxis(matrix / of_rows[:, np.newaxis] / of_columns, 2, 0), (rates / of_rows).T[:, :, np.newaxis]

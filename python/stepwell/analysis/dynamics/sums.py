@@ -51,7 +51,7 @@ class Sums(NamedTuple):
         return np.asarray(rows[:, self.free] - np.einsum("ik...,kj->ij...", rows[:, self.kept], self.ratios))
 
     def at(self, matrix: Array) -> Sums:
-        """These sums, or none if the derivatives of the rates at a place show that one is not constant there."""
+        """Return these sums, or none if the derivatives of the rates at a place show that one is not constant there."""
         if _changes(self.weights, matrix, CONSTANT[1]).any():
             return none(len(matrix), self.first)
         return self

@@ -97,5 +97,5 @@ class Variational(System):
         return _Rates(h, evaluation, maps.size(self.of)[0])
 
     def given_inputs(self) -> dict[str, Input]:
-        """Those of the system."""
+        """The inputs of the system."""
         return self.of.given_inputs()

@@ -36,7 +36,7 @@ class StabilityFunction(NamedTuple):
 
     @property
     def a_stable(self) -> bool:
-        """Whether no mode that decays, or keeps its amplitude, grows by any step: |R(z)| ≤ 1 wherever Re z ≤ 0.
+        """True if no mode that decays, or keeps its amplitude, grows by any step: |R(z)| ≤ 1 wherever Re z ≤ 0.
 
         By the maximum principle that is so if no pole lies there and |R| ≤ 1 on the imaginary axis, z = iy. There both squares
         of magnitudes are polynomials in y².
@@ -53,7 +53,7 @@ class StabilityFunction(NamedTuple):
 
     @property
     def l_stable(self) -> bool:
-        """Whether it is A-stable, and the faster a mode decays, the nearer to zero a step brings it: R(z) → 0 for z → −∞."""
+        """True if it is A-stable, and the faster a mode decays, the nearer to zero a step brings it: R(z) → 0 for z → −∞."""
         return self.a_stable and len(self.above.coefficients) < len(self.below.coefficients)
 
     def _repr_html_(self) -> str:
@@ -105,7 +105,7 @@ def _function(method: Method) -> StabilityFunction:
 
 
 def a_stable(method: Method) -> bool:
-    """Whether a method is A-stable; one that treats both blocks differently is not."""
+    """True if a method is A-stable; one that treats both blocks differently is not."""
     return method.is_implicit and _function(method).a_stable
 
 
@@ -121,7 +121,7 @@ def _square_on_axis(p: Polynomial, *, signs: bool = True) -> Polynomial:
 
 
 def _never_negative(p: Polynomial) -> bool:
-    """Whether a polynomial is nowhere below zero where its unknown is above: tried between its roots, exactly."""
+    """True if a polynomial is nowhere below zero where its unknown is above: tried between its roots, exactly."""
     if not p.coefficients:
         return True
     roots = np.roots([float(c) for c in p.coefficients[::-1]])

@@ -21,7 +21,7 @@ COARSE_STRIDE, CIRCLE_TOLERANCE = 8, 1e-13
 
 
 def passes_zero(f: Polynomial, x: float) -> bool:
-    """Whether a polynomial changes its sign within a few last digits of x."""
+    """True if a polynomial changes its sign within a few last digits of x."""
     before, after = (f(Fraction(x * (1.0 + 8.0 * side * EPS))) for side in (-1, 1))
     return bool((before < 0) != (after < 0))
 

@@ -16,7 +16,7 @@ from .eigen import Complex
 
 @by_value
 class Mode(NamedTuple):
-    """What begins to grow at a stability limit.
+    """The mode that begins to grow at a stability limit.
 
     Attributes:
         eigenvalue: z of P at the limit, on the unit circle.
@@ -64,7 +64,7 @@ class StabilityLimit(float):
 
     @property
     def decided(self) -> bool:
-        """Whether the limit is known. It is not where so many eigenvalues nearly meet that rounding hides what grows."""
+        """True if the limit is known. It is not where so many eigenvalues nearly meet that rounding hides what grows."""
         return self.grows == self.stable
 
     def __repr__(self) -> str:
@@ -113,7 +113,7 @@ class StabilityLimits(np.ndarray[Any, np.dtype[np.float64]]):
 
     @property
     def decided(self) -> Any:
-        """Whether each limit is known, as ``StabilityLimit.decided``."""
+        """True where the limit is known, as ``StabilityLimit.decided``."""
         return np.asarray(self.grows == self.stable)
 
     def __reduce__(self) -> tuple[Any, ...]:

@@ -86,7 +86,7 @@ class Search:
         self.rates = maps.rates(system, t, v, y) if rates is None else rates
         self.members: Shape = self.rates.shape[2:]
         self.exact = eigen.eigen(self.rates) if exact_rates is None else exact_rates
-        #: Whether eigenvalues that nearly meet can be computed in more digits.
+        #: True if eigenvalues that nearly meet can be computed in more digits.
         self.exactable = v is None and 2 < len(self.rates) <= exact.MAX_ROWS
 
     @cached_property
@@ -117,7 +117,7 @@ class Search:
 
     @cached_property
     def grows_by_itself(self) -> Truths:
-        """Whether the exact solution grows."""
+        """True where the exact solution grows."""
         return self._speed[1]
 
     @cached_property
@@ -258,7 +258,7 @@ class Search:
             return np.stack([1.0 - q, 1.0 + q - twice_p, 1.0 + q + twice_p]), eigen.tolerance(P)
 
     def valleys(self, fastest: Array, low: Array, high: Array, first: Any, never: Any) -> tuple[Array, Array, Any]:
-        """The same enclosure, or an earlier one between two rungs, where a method grows in a window that contains no rung.
+        """The enclosure, or an earlier one between two rungs, where a method grows in a window that contains no rung.
 
         A step of two states is stable if three smooth margins are not negative. Where one has a valley between rungs that may be
         so deep, its lowest point is searched.
@@ -291,7 +291,7 @@ class Search:
         return low, high, first
 
     def bisected(self, low: Array, high: Array) -> tuple[Array, Array]:
-        """The same enclosure, as narrow as numbers allow."""
+        """The enclosure bisected until it is as narrow as numbers allow."""
         for _ in range(60):
             middle = 0.5 * (low + high)
             if ((middle == low) | (middle == high)).all():

@@ -207,7 +207,7 @@ def _with(multiples: list[list[float | None]], i: int, j: int, value: complex) -
 
 @cache
 def function_of_rates(method: Method) -> bool:
-    """Whether a step of ṡ = A·s is a function of h·A: the method treats both blocks alike. Tested exactly on one matrix.
+    """True if a step of ṡ = A·s is a function of h·A: the method treats both blocks alike. Tested exactly on one matrix.
 
     An implicit step is, since it has the Jacobian of both blocks.
     """

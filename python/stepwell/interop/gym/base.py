@@ -45,7 +45,7 @@ def _ends(space: Any) -> tuple[Any, Any, bool]:
 
 
 def parts_of(returned: Any, rule: str, *names: str) -> Any:
-    """What a rule of an environment returned, which must be as many things as these names."""
+    """The parts that a rule of an environment returned, which must be as many as these names."""
     several = isinstance(returned, (tuple, list)) or getattr(returned, "ndim", 0) > 0
     if not several or len(returned) != len(names):
         number = f"{len(returned)} values" if several else checks.short(returned)
@@ -199,7 +199,7 @@ class WorldVectorEnv(VectorEnv):  # type: ignore[misc]  # gymnasium's types are 
 
     @property
     def begins_at_next_step(self) -> bool:
-        """Whether an environment whose episode ended begins anew at the next call of ``step``."""
+        """True if an environment whose episode ended begins anew at the next call of ``step``."""
         return self.autoreset_mode is AutoresetMode.NEXT_STEP
 
     @property
@@ -316,7 +316,6 @@ class WorldVectorEnv(VectorEnv):  # type: ignore[misc]  # gymnasium's types are 
         return actions if self._whole else np.clip(actions, self._low, self._high)
 
     def _is_finite(self) -> Truths:
-        """Whether the state of each environment is finite."""
         v, y = (np.isfinite(block).reshape(-1, self.num_envs).all(axis=0) for block in (self.world.v, self.world.y))
         finite: Truths = np.asarray(v & y)
         return finite
@@ -370,7 +369,7 @@ class WorldVectorEnv(VectorEnv):  # type: ignore[misc]  # gymnasium's types are 
         self._over[places] = False
 
     def seen(self) -> Observations:
-        """What is seen of the states, in float32."""
+        """The observations of the states, in float32."""
         # Rounding to float32 may pass a bound by one unit of its last place.
         space = self.one_observation
         seen = _of_shape(self.observe(), f"{type(self).__name__}.observe", self.observation_space.shape)

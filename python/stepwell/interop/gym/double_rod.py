@@ -84,7 +84,7 @@ class DoubleRodVectorEnv(TracedVectorEnv):
 
     @staticmethod
     def score(v: Any, y: Any, action: Any, before: tuple[Any, Any]) -> tuple[Any, Any]:
-        """Whether the tip is up."""
+        """The rewards, and True where the tip is up."""
         up = y[1][1] > GOAL
         return np.where(up, 0.0, -1.0), up
 

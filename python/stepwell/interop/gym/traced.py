@@ -24,9 +24,9 @@ from .base import Observations, Truths, WorldVectorEnv, parts_of
 
 #: Above so many operations a step is not one tape.
 MOST_OPERATIONS = 100_000
-#: What the rules return.
+#: Results of the rules.
 PARTS = {"push": ("v", "y", "a force or None"), "settle": ("v", "y"), "score": ("a reward", "an end")}
-#: What ``look`` returns.
+#: Result of ``look``.
 SEEN = "an observation, as one_observation is,"
 #: The rows behind the state that go on, and those of reward and truths: see ``World.play`` of the core.
 GO_ON, MADE = 2, 3
@@ -53,7 +53,7 @@ class TracedVectorEnv(WorldVectorEnv):
     @staticmethod
     @abstractmethod
     def look(v: Any, y: Any) -> Any:
-        """What is seen of a state: a list of numbers."""
+        """The observation of a state: a list of numbers."""
 
     @staticmethod
     @abstractmethod
@@ -123,7 +123,7 @@ class TracedVectorEnv(WorldVectorEnv):
         self.prepare()
 
     def _fits(self) -> bool:
-        """Whether the world's steps can be on a tape of their own."""
+        """True if the world's steps can be on a tape of their own."""
         world = self.world
         system, method = world.system, world.method
         own_time = system.reads_time or bool(system.all_inputs())
@@ -159,7 +159,7 @@ class TracedVectorEnv(WorldVectorEnv):
         return self._made(self._play)
 
     def seen(self) -> Observations:
-        """What is seen of the states."""
+        """The observations of the states."""
         return super().seen() if self._look is None else self._made(self._look)[0]
 
     def _restart(self, places: Any) -> None:
@@ -223,7 +223,7 @@ class TracedVectorEnv(WorldVectorEnv):
 
 
 def _items(value: Any, shape: Any, part: str) -> Any:
-    """What a rule returned as an array of objects of this shape: numbers of all environments, or symbols."""
+    """The result of a rule as an array of objects of this shape: numbers of all environments, or symbols."""
     items = objects(value)
     out = np.empty(items.size, dtype=object)
     for i, each in enumerate(items.flat):
@@ -236,7 +236,7 @@ def _items(value: Any, shape: Any, part: str) -> Any:
 
 
 def _values(value: Any, shape: Any, part: str) -> Array:
-    """What a rule returned, as an array whose last axis is that of the environments."""
+    """The result of a rule as an array whose last axis is that of the environments."""
     items = _items(value, shape[:-1], part)
     return np.array([np.broadcast_to(each, shape[-1:]) for each in items.flat], np.float64).reshape(shape)
 

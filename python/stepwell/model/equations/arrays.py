@@ -67,7 +67,7 @@ _MOVING = (
 MOVING = {getattr(np, name) for name in _MOVING.split()}
 
 
-#: Whether sine and cosine are those of the built-in systems: see ``stepwell.system``.
+#: True if sine and cosine are those of the built-in systems: see ``stepwell.system``.
 QUICK_SINES: ContextVar[bool] = ContextVar("quick_sines", default=False)
 _QUICK = {"sin": trig.sin, "cos": trig.cos}
 
@@ -144,7 +144,7 @@ def function_of(function: Any, arguments: Any, options: Any) -> Any:
         raise TraceError(f"np.{name}: {error}") from None
 
 
-#: Those of these functions that turn a number into an array.
+#: Functions of these that turn a number into an array.
 _WIDENING = {np.atleast_1d, np.atleast_2d, np.broadcast_to, np.expand_dims, np.repeat, np.tile}
 
 

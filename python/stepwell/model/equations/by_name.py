@@ -11,7 +11,7 @@ from ...errors import ArgumentError
 
 
 def reduced(definition: Any, what: str) -> tuple[Any, tuple[str, str]]:
-    """What ``__reduce__`` of a definition returns. Raises if it is not found by its name; ``what`` it is, for the message."""
+    """The value of ``__reduce__`` of a definition. Raises if it is not found by its name; ``what`` it is, for the message."""
     module, name = definition.__module__, definition.__qualname__
     known: Any = sys.modules.get(module)
     for each in name.split("."):

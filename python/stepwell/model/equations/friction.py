@@ -12,7 +12,7 @@ from ...errors import ArgumentError, DTypeError
 from .of_state import parameters_of
 from .values import of_shape
 
-#: What friction acts on.
+#: Parts of the velocities on which friction acts.
 FrictionOf = Literal["component", "row"]
 FRICTION_OF = get_args(FrictionOf)
 

@@ -7,7 +7,7 @@ from ...reference.mass import Mass
 
 
 class TracedFunction(Protocol):
-    """What invariants and Taylor series need of ``trace.Equations``.
+    """The part of ``trace.Equations`` that invariants and Taylor series need.
 
     Attributes:
         v_shape: shape of a member's velocity block.

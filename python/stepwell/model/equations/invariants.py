@@ -127,7 +127,7 @@ class Traced:
 
 
 def _are_single(*blocks: Any) -> bool:
-    """Whether the blocks hold symbols of float32."""
+    """True if the blocks hold symbols of float32."""
     of_symbols = (np.asarray(block) for block in blocks)
     return any(getattr(each, "single", False) for block in of_symbols if block.dtype == object for each in block.flat)
 

@@ -15,7 +15,7 @@ from ...base.arrays import Array
 from ...errors import ArgumentError, ShapeError
 from ...reference.mass import Row
 
-#: What is left of a row of M, its largest entry being between 1 and 2, counts as zero where it is below this.
+#: Remainder of a row of M, its largest entry being between 1 and 2, counts as zero where it is below this.
 NOTHING = 1e-13
 
 

@@ -20,7 +20,7 @@ from .values import Operators, array
 
 
 def _holds(x: Any) -> bool:
-    """Whether a value is or contains one that is not known yet."""
+    """True if a value is or contains one that is not known yet."""
     if isinstance(x, Operators):
         return True
     if isinstance(x, np.ndarray):

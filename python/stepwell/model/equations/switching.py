@@ -156,12 +156,12 @@ class Switches:
         values = self._of_values(rates.operations.places)
         switches = [each for line in rates.operations.needed for each in self._jumps(line)]
         switches += [each for line in rates.operations.needed if line in values for each in self._bends(line)]
-        #: Whether there are pieces between which the time alone chooses.
+        #: True if there are pieces between which the time alone chooses.
         self.by_time = any(self._by_time(each) for each in switches if not each.smooth)
         shapes = self._shapes(rates.operations)
         switches = [each._replace(shapes=shapes.get(each.left, ())) if self._repeated(each) else each for each in switches]
         solvable = [each for each in switches if self._solvable(each)]
-        #: Whether some are not solved for.
+        #: True if some are not solved for.
         self.unsolvable = any(not (each.smooth or self._solvable(each)) for each in switches)
         #: The constants of the function with which the time itself is compared, and all other switches.
         self.constants = np.unique([time for each in solvable if (time := self._constant_time(each)) is not None])
@@ -280,7 +280,7 @@ class Solving:
         self.changes, self.powers = switches.changes, switches.powers
         self.numbers = numbers
         self.axes = max((each.ndim for each in numbers if each is not None), default=0)
-        #: Whether a condition switches too often to be searched, and whether one has no inverse here.
+        #: True if a condition switches too often to be searched, and True if one has no inverse here.
         self.too_many = self.unsolved = False
         self.samples = np.linspace(begin, end, ARGUMENT_SAMPLES).reshape(-1, *self.axes * (1,))
 
@@ -359,7 +359,7 @@ class Solving:
         return periodic.reshape(-1, *periodic.shape[2:])
 
     def _narrow(self, times: Array, shapes: Sequence[int], bells: bool) -> Array:
-        """These middles of bells or ramps that repeat, or with ``bells`` of bells alone, where they are narrow, else NaN."""
+        """The middles of bells or ramps that repeat, or with ``bells`` of bells alone, where they are narrow, else NaN."""
         ordered = np.sort(times, axis=0)
         apart = np.diff(ordered, axis=0)
         apart[~(apart > HEIGHT * np.nanmax(apart, axis=0, initial=0.0))] = np.inf
@@ -377,7 +377,7 @@ class Solving:
         return np.where(narrow, times, np.nan) if narrow.any() else times[:0]
 
     def _exact(self, times: Array, switch: Switch) -> Array:
-        """These times to the last bits: where the piece changes, if it changes once nearby."""
+        """The times to the last bits: where the piece changes, if it changes once nearby."""
         rounding = np.spacing(np.maximum(np.abs(times), np.finfo(np.float64).eps))
         for roundings in WIDER:
             before, after = times - roundings * rounding, times + roundings * rounding

@@ -96,7 +96,7 @@ class Equations:
         return None if matrix is None or not matrix.algebraic else Mass(matrix.rows, self.y_shape)
 
     def keeping(self, name: str, *, limited: bool, pushed: bool) -> Equations:
-        """These equations with an invariant that a control or a projection keeps."""
+        """Return these equations with an invariant that a control or a projection keeps."""
         equations = copy.copy(self)
         equations.kept, equations.limited, equations.pushed = name, limited, pushed
         return equations
@@ -111,7 +111,7 @@ class Equations:
 
     @property
     def second_order(self) -> bool:
-        """Whether ẏ is v."""
+        """True if ẏ is v."""
         return self.definition.order == 2 and self.definition.blocks == 1 and not self.pushed
 
     def __eq__(self, other: object) -> bool:
@@ -165,7 +165,6 @@ class Equations:
         return self.definition.stick_friction if self.rubs else None
 
     def _result(self, function: Callable[..., Any], name: str, t: Any, v: Numbers, y: Numbers, values: dict[str, Any]) -> Any:
-        """What a function of the time, the state and parameters returns."""
         batch = np.broadcast_shapes(*self.batches(v, y), np.shape(t))
         with np.errstate(all="ignore"):
             parameters = {each: self._parameter(each, value, t, batch) for each, value in values.items()}
@@ -297,7 +296,7 @@ def kind_of(value: Any) -> str:
 
 
 def _items(name: str, what: str, value: Any, shape: Shape) -> Any:
-    """What a function returned as an array of objects; one number serves all."""
+    """The result of a function as an array of objects; one number serves all."""
     try:
         items = array(value).items
     except TraceError as error:

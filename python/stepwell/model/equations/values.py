@@ -451,7 +451,7 @@ class Array(Operators):
         return self
 
     def reshape(self, *shape: Any) -> Any:
-        """The same elements in another shape."""
+        """Return the same elements in another shape."""
         return wrapped(self.items.reshape(*shape))
 
     def ravel(self) -> Array:
@@ -494,11 +494,11 @@ class Array(Operators):
         return ARRAY_FUNCTIONS["reduced"]("max", partial(elementwise, "maximum", functions.maximum), self, axis, keepdims)
 
     def all(self, axis: Any = None, keepdims: bool = False) -> Any:
-        """Whether all comparisons are true."""
+        """True where all comparisons are true."""
         return ARRAY_FUNCTIONS["reduced"]("all", operator.and_, self, axis, keepdims)
 
     def any(self, axis: Any = None, keepdims: bool = False) -> Any:
-        """Whether some comparison is true."""
+        """True where some comparison is true."""
         return ARRAY_FUNCTIONS["reduced"]("any", operator.or_, self, axis, keepdims)
 
     def dot(self, other: Any) -> Any:
@@ -511,7 +511,7 @@ class Array(Operators):
 
 
 def _symbolic(index: Any) -> bool:
-    """Whether an index is or contains a value that is not known yet."""
+    """True if an index is or contains a value that is not known yet."""
     if isinstance(index, (tuple, list)):
         return any(map(_symbolic, index))
     return isinstance(index, Operators)

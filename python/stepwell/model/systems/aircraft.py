@@ -136,7 +136,7 @@ class Aircraft(OwnSystem):
 
     @property
     def torques_act(self) -> bool:
-        """Whether dampers, controllers or torques act, so that the energy is not constant."""
+        """True if dampers, controllers or torques act, so that the energy is not constant."""
         values = self.parameters_given
         gains = values["gains"] if self.controllers else values["gains"][2]
         return bool(values["damping"].any() or gains.any() or any(name.endswith("torque") for name in values))
@@ -211,7 +211,7 @@ class Aircraft(OwnSystem):
         return cast("Aircraft", super().under(_of_length_one(control), batch))
 
     def keeps(self, control: Any) -> bool:
-        """Whether a control acts on the quaternion's length through the rates; a projection is that of an invariant."""
+        """True if a control acts on the quaternion's length through the rates; a projection is that of an invariant."""
         return self.form == "quaternion" and isinstance(control, NormControl)
 
     def _with_constraint_control(self, control: Any) -> Aircraft:

@@ -19,7 +19,7 @@ SMALLEST_COSINE = 1e-5
 
 
 def is_given(parameter: Any) -> bool:
-    """Whether a parameter has a value of the system; the default, which means none, is a float."""
+    """True if a parameter has a value of the system; the default, which means none, is a float."""
     return not isinstance(parameter, float)
 
 
@@ -110,7 +110,7 @@ def quaternion(
     yaw_torque: Any = 0.0,
     strength: Any = 0.0,
 ) -> Any:
-    """The same torques; the attitude is a quaternion, scalar first, whose rate has no trap. A NormControl has ``strength``."""
+    """``euler`` with a quaternion as attitude, scalar first, whose rate has no singularity. A NormControl has ``strength``."""
     w, x, y, z = q
     square = w * w + x * x + y * y + z * z
     # The last row of the rotation matrix, which is (−sin θ, sin φ·cos θ, cos φ·cos θ), times q·q.

@@ -115,7 +115,7 @@ class System(Immutable, ValueEquality, ABC):
 
     @property
     def has_stick_friction(self) -> bool:
-        """Whether friction that sticks acts on its velocities."""
+        """True if friction that sticks acts on its velocities."""
         return self.part("friction") is not None
 
     @property
@@ -146,7 +146,7 @@ class System(Immutable, ValueEquality, ABC):
         return [*self.repr_arguments(), *(argument for part in self.around for argument in part.repr_arguments())]
 
     def _repr_html_(self) -> str:
-        """The same as a table, for notebooks, with what its states are."""
+        """The arguments as a table, for notebooks, with what its states are."""
         arguments = [
             (name, value) if equal else ("", name)
             for name, equal, value in (each.partition("=") for each in self._all_arguments())
@@ -171,7 +171,7 @@ class System(Immutable, ValueEquality, ABC):
 
     @property
     def fuses_on_tape(self) -> bool:
-        """Whether products of a step that the rates do not fuse are fused on the tape of the step."""
+        """True if products of a step that the rates do not fuse are fused on the tape of the step."""
         return True
 
     @abstractmethod
@@ -331,7 +331,7 @@ class System(Immutable, ValueEquality, ABC):
 
     @property
     def chooses(self) -> bool:
-        """Whether the rates are made of pieces between which the state or the time chooses."""
+        """True if the rates are made of pieces between which the state or the time chooses."""
         return False
 
     def parameters(self, batch: Shape, *, series: bool = False, single: bool = False) -> CoreParameters:
@@ -425,7 +425,7 @@ class System(Immutable, ValueEquality, ABC):
         return self._with_control(control.aimed(np.ones(batch), np.zeros(batch), TINY))
 
     def keeps(self, control: Any) -> bool:
-        """Whether a control or projection is that of the system's own constraint."""
+        """True if a control or projection is that of the system's own constraint."""
         constraint = getattr(control, "constraint", None) or getattr(control, "way", None)
         return constraint is not None and constraint == self.constraint
 
@@ -493,12 +493,12 @@ class System(Immutable, ValueEquality, ABC):
 
     @property
     def reads_time(self) -> bool:
-        """Whether its equations depend on the time otherwise than through inputs."""
+        """True if its equations depend on the time otherwise than through inputs."""
         return False
 
     @property
     def switches_by_time(self) -> bool:
-        """Whether its rates are made of pieces between which the time alone chooses."""
+        """True if its rates are made of pieces between which the time alone chooses."""
         return False
 
     def switching_times(self, begin: float, end: float) -> Array:
@@ -520,7 +520,7 @@ class System(Immutable, ValueEquality, ABC):
         return self.over_steps_of_inputs(first, dt, sampled)
 
     def over_steps_of_inputs(self, first: Any, dt: float, sampled: list[Sampled]) -> Self:
-        """The same without a controller."""
+        """The means over each step from ``first``, without a controller."""
         if all(each.over_steps(first, dt) is each for each in sampled):
             return self
 
@@ -541,7 +541,7 @@ class System(Immutable, ValueEquality, ABC):
 
     @property
     def has_time(self) -> bool:
-        """Whether its rates may depend on the time."""
+        """True if its rates may depend on the time."""
         return bool(self.all_inputs())
 
     def without_inputs(self) -> System:

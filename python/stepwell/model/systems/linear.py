@@ -342,7 +342,7 @@ def joined(part: Realisation, arguments: str = "system") -> LinearSystem:
 
 
 def is_gain(value: Any) -> bool:
-    """Whether a value may be a gain: a number, or an array of them."""
+    """True if a value may be a gain: a number, or an array of them."""
     return (isinstance(value, Real) and not isinstance(value, bool)) or isinstance(value, (np.ndarray, np.generic))
 
 

@@ -62,7 +62,7 @@ class NBody(System):
     unchanged: ClassVar[dict[str, float]] = {"softening": checks.NOT_NEGATIVE}
     reference = reference.NBody
     complex_step = True
-    #: Whether products of the forces are fused, which a run decides.
+    #: True if products of the forces are fused, which a run decides.
     fused = False
     axes = "bodies, dim"
 
@@ -133,7 +133,7 @@ class NBody(System):
         return changed(self, **numbers, batch=(), around=tuple(part.member(one) for part in self.around))
 
     def with_arguments(self, arguments: dict[str, Any]) -> Self:
-        """These bodies with other numbers: those without mass stay so, since others do not meet them."""
+        """Return these bodies with other numbers: those without mass stay so, since others do not meet them."""
         other = super().with_arguments(arguments)
         masses = other.masses[self.massless]
         if masses.any():
@@ -183,7 +183,7 @@ class NBody(System):
 
     @property
     def keeps_energy(self) -> bool:
-        """Whether the energy is constant in the true motion."""
+        """True if the energy is constant in the true motion."""
         return self.control is None and not self.contacts and self.force != "printed"
 
     def with_fused_rates(self) -> NBody:
@@ -192,7 +192,7 @@ class NBody(System):
 
     @property
     def fuses_on_tape(self) -> bool:
-        """Whether there are so few that a step is one tape. More may be stepped in other ways, which must have the same bits."""
+        """True if there are so few that a step is one tape. More may be stepped in other ways, which must have the same bits."""
         return len(self.masses) <= MOST_ON_TAPE
 
     def equation_parameters(self, batch: Shape) -> dict[str, Any]:
@@ -204,7 +204,7 @@ class NBody(System):
         return sizes | {"masses": masses, "strength": self.G * masses, "softening": self.softening}
 
     def own_parameters(self, batch: Shape) -> dict[str, Any]:
-        """Those of the equations, of all members or some, and whether the forces are fused."""
+        """The parameters of the equations, of all members or some, and whether the forces are fused."""
         parameters = super().own_parameters(batch)
         return parameters | {"fused": 1} if self.fused else parameters
 

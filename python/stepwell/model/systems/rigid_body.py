@@ -131,7 +131,7 @@ class RigidBody(System):
 
     @property
     def torques_act(self) -> bool:
-        """Whether torques or damping act, so that the energy may change; the energy of a weight is included in it."""
+        """True if torques or damping act, so that the energy may change; the energy of a weight is included in it."""
         return bool(self.given_inputs()) or (self.damping is not None and bool((self.damping != 0.0).any()))
 
     def doubt(self, y: Array) -> tuple[str, Any] | None:

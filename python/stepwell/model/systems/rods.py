@@ -161,7 +161,7 @@ class Rods(RodSystem):
 
     @property
     def has_loops(self) -> bool:
-        """Whether rods form a loop, where all anchors count as one point."""
+        """True if rods form a loop, where all anchors count as one point."""
         groups: dict[End, End] = {}
 
         def group(end: End) -> End:

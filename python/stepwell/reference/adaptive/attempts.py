@@ -110,7 +110,7 @@ class Backward:
 
 
 class Tried(NamedTuple):
-    """What an attempt makes before it is decided whether it counts.
+    """The result of an attempt before it is decided whether it counts.
 
     Attributes:
         v: velocities after the step.

@@ -11,7 +11,7 @@ from .sizes import stacked
 MIN_FACTOR, MAX_FACTOR = 0.2, 5.0
 #: The first step is at least so many times the time of the start: 2¹² roundings.
 MOVES = 1.0 / (1 << 40)
-#: The same of float32, 2⁸ of its roundings: a state at an event is known to them only, and the next step must lead away from it.
+#: As ``MOVES``, for float32, 2⁸ of its roundings: no state at an event is known better, and the next step must lead away from it.
 SINGLE_MOVES = 1.0 / (1 << 16)
 
 
@@ -109,7 +109,7 @@ class Pace(NamedTuple):
         return where(ends, self.wall, self.t + self.h), ends
 
     def outlook(self, budget: Any) -> Outlook:
-        """What comes next."""
+        """The outlook on the next step."""
         is_extra = less(0.0, self.extra)
         _, ends = self.reach()
         moves = less(self.t, self.t + self.h)

@@ -46,7 +46,7 @@ SLOW, PUSHES, UNLIKE, HOLDS_DOWN, ALIKE, ROUNDED, FADES, ROUNDINGS = 0.75, 1024.
 #: margin. So an error of v that moves y by less is tolerated, however small v is: near rest, where forces cancel, v is only
 #: rounding.
 ROUNDING = 1.0 / (1 << 40)
-#: The same of states of float32, whose roundings are 2²⁹ times as large.
+#: As ``ROUNDING``, for states of float32, whose roundings are 2²⁹ times as large.
 SINGLE_ROUNDING = 1.0 / (1 << 11)
 #: A component that has been zero so far counts as this part of the largest in its block. A cascade or a wave reaches one
 #: component after the other, each at first with a power of the time that is beyond the order of the method: relative to itself

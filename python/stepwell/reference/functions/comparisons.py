@@ -14,35 +14,35 @@ from .elementary import elementary
 
 @elementary
 def less(x: Any, y: Any) -> Any:
-    """Whether x < y."""
+    """True where x < y."""
     return x < y
 
 
 @elementary
 def less_equal(x: Any, y: Any) -> Any:
-    """Whether x ≤ y."""
+    """True where x ≤ y."""
     return x <= y
 
 
 @elementary
 def greater(x: Any, y: Any) -> Any:
-    """Whether x > y."""
+    """True where x > y."""
     return x > y
 
 
 @elementary
 def greater_equal(x: Any, y: Any) -> Any:
-    """Whether x ≥ y."""
+    """True where x ≥ y."""
     return x >= y
 
 
 @elementary
 def equal(x: Any, y: Any) -> Any:
-    """Whether x = y; of −0 and 0 it is."""
+    """True where x = y, as −0 and 0 are."""
     return bits.equal(x, y)
 
 
 @elementary
 def not_equal(x: Any, y: Any) -> Any:
-    """Whether x ≠ y, or one of both is NaN."""
+    """True where x ≠ y, or one of both is NaN."""
     return ~bits.equal(x, y)

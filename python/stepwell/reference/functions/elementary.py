@@ -55,7 +55,7 @@ def shape_of(names: Sequence[str], values: Sequence[Any]) -> tuple[int, ...]:
 
 
 def one_by_one(values: Sequence[Any]) -> bool:
-    """Whether there are arrays whose elements are symbols, or arrays beside a symbol."""
+    """True if some values are arrays of symbols, or arrays beside a symbol."""
     kinds = [each.dtype == object for each in values if isinstance(each, np.ndarray)]
     return any(kinds) or (bool(kinds) and symbol_of(values) is not None)
 

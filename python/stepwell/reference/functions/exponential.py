@@ -19,7 +19,7 @@ RAISED = PerPrecision(double=100, single=64)
 
 
 class Constants(NamedTuple):
-    """Those of one precision.
+    """Constants of one precision.
 
     Attributes:
         log2_e: 1/ln 2.
@@ -116,7 +116,7 @@ class Reduced(NamedTuple):
         return self.z * sum_of_powers(self.r, self.z, CONSTANTS.of(self.r).exp_short) - self.lower
 
     def accurate_rest(self) -> Any:
-        """The same, accurate where 1 + upper cancels: r²/2 by itself has one rounding less than within the polynomial."""
+        """The rest, accurate where 1 + upper cancels: r²/2 by itself has one rounding less than within the polynomial."""
         exp = CONSTANTS.of(self.r).exp
         return (0.5 * self.z + (self.z * self.r) * sum_of_powers(self.r, self.z, exp)) - self.lower
 
@@ -127,7 +127,7 @@ def sum_of_powers(x: Any, z: Any, coefficients: Sequence[float]) -> Any:
 
 
 def magic(x: Any, low: Any) -> Any:
-    """What a whole number n is added to for ``scaled``: an exponent's bits stand in the low ones of the sum."""
+    """The number to which a whole number n is added for ``scaled``: an exponent's bits stand in the low ones of the sum."""
     precision, raised = PRECISIONS.of(x), RAISED.of(x)
     return where(low, precision.magic + (precision.bias + raised), precision.magic + (precision.bias - 1.0))
 

@@ -16,7 +16,7 @@ from .pieces import fast_sum, halves, polynomial, power_of_two, quotient
 
 
 class Constants(NamedTuple):
-    """Those of one precision.
+    """Constants of one precision.
 
     Attributes:
         sinh: (sinh r − r)/r³ in powers of r².

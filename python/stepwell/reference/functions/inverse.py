@@ -12,7 +12,7 @@ TAN_EIGHTH = 0.41421356237309503
 
 
 class Constants(NamedTuple):
-    """Those of one precision.
+    """Constants of one precision.
 
     Attributes:
         atan: (arctan t − t)/t³ in powers of t², up to t = tan(π/8).

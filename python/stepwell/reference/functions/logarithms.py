@@ -29,7 +29,7 @@ from .pieces import INFINITY, NAN, fast_sum, halves, polynomial, power_of_two
 
 
 class Constants(NamedTuple):
-    """Those of one precision.
+    """Constants of one precision.
 
     Attributes:
         log: 2·(artanh s − s)/s³ in powers of s².

@@ -22,7 +22,7 @@ def polynomial(x: Any, coefficients: Sequence[float]) -> Any:
 
 
 def by_parity(x: Any, z: Any, coefficients: Sequence[float]) -> Any:
-    """The same polynomial, with z = x²: even and odd powers are summed apart, so that neither sum waits for the other."""
+    """A polynomial, with z = x²: even and odd powers are summed apart, so that neither sum waits for the other."""
     return polynomial(z, coefficients[::2]) + x * polynomial(z, coefficients[1::2])
 
 

@@ -11,7 +11,7 @@ from .pieces import INFINITY, fast_sum, halves
 
 
 class Constants(NamedTuple):
-    """Those of one precision. All are powers of two but the start.
+    """Constants of one precision. All are powers of two but the start.
 
     Attributes:
         exponent_place: the lowest bit of those that the cube root starts from.

@@ -20,7 +20,7 @@ DEGREE, RADIAN = 0.017453292519943295, 57.29577951308232
 
 
 class Constants(NamedTuple):
-    """Those of one precision.
+    """Constants of one precision.
 
     Attributes:
         half_pi: π/2: three parts of 29 or 11 bits, and what then remains to 53 or 24.

@@ -25,7 +25,7 @@ class Equations:
         self.parameters = parameters
 
     def stretched(self, h: Any) -> "Equations":
-        """The same, scaled to another step, which may be one for each member: what a limited control pushes depends on it."""
+        """The system scaled to another step, which may be one for each member: what a limited control pushes depends on it."""
         other = copy.copy(self)
         other.h = np.asarray(h)
         return other

@@ -200,7 +200,7 @@ class NBody(Recorded):
         return dv
 
     def among(self, y: Array, strength: Array, potential: Array | None) -> Array:
-        """The same of bodies with mass, from every pair once.
+        """The accelerations, as in ``meet``, among bodies with mass, from every pair once.
 
         Body i pulls the partner after it, i + k, and is pulled by it; what bodies get from the partners after them and before
         them is summed apart, the latter over two rounds (body n + j is body j) so that no index wraps. These sums start from −0:
@@ -267,7 +267,7 @@ class NBody(Recorded):
         return dv, kinetic, kinetic + total(self.masses[massive] * potential)
 
     def unfused(self) -> NBody:
-        """The same bodies for what is recorded."""
+        """Return these bodies without fused forces, for what is recorded."""
         other = copy(self)
         other.fused = False
         return other

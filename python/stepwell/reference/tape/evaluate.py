@@ -59,7 +59,7 @@ class Evaluation:
         self._run = compiled(lines, places, tape.single)
 
     def of(self, numbers: Mapping[int, Any], tables: Sequence[Any]) -> Evaluation:
-        """The same with other parameters and inputs, of a tape of float64."""
+        """Return this evaluation with other parameters and inputs, of a tape of float64."""
         other = copy(self)
         other._numbers, other._tables = numbers, tables
         return other

@@ -1,4 +1,4 @@
-"""What ``fused=True`` does to a tape first of all: a function that is written in many operations is written in fewer fused ones.
+"""First change of a tape by ``fused=True``: a function that is written in many operations is written in fewer fused ones.
 
 Without fused multiply-adds a sine takes the reduction by π/2 in four parts, and both sine and cosine of what remains. With them
 x − nπ is exact in one operation, and so is what a square or a sum loses. So one polynomial on [−π/2, π/2] is enough: with
@@ -157,14 +157,14 @@ def bound_lines(form: Form, tape: Sequence[Operation], line: int) -> dict[int, i
 
 
 def in_quick_forms(tape: Sequence[Operation], roots: Sequence[int]) -> tuple[list[Operation], list[int]]:
-    """The same tape with functions in their quick forms, and the lines of the roots; all lines are needed for the roots."""
+    """Rewrite a tape with functions in their quick forms; also the lines of the roots; all lines are needed for the roots."""
     of_state = of_any(tape, "state")
     reads = Counter([*roots, *(line for operation in tape for line in operation.of)])
     lines = Lines(DOUBLE)
     place: list[int] = []
 
     def is_apart(bound: dict[int, int], form: Form) -> bool:
-        """Whether nothing else reads a value within the function."""
+        """True if nothing else reads a value within the function."""
         within = Counter(bound[each] for operation in form.plain for each in operation.of)
         inner = [bound[line] for line, (name, _, _) in enumerate(form.plain[:-1]) if name not in ("state", "constant")]
         return all(within[line] == reads[line] for line in inner)

@@ -13,7 +13,7 @@ from .terms import terms_apart
 
 
 def fused(tape: Sequence[Operation], roots: Sequence[int], *, single: bool = False) -> tuple[list[Operation], list[int]]:
-    """The same tape with fused multiply-adds, and the lines of the roots on it.
+    """Rewrite a tape with fused multiply-adds; also the lines of the roots on it.
 
     ``roots`` are the lines of the next state, and all others are needed for them. First functions get their quick forms,
     increments are multiplied last, quotients by numbers become products, and sums of two products are taken apart. Then a product

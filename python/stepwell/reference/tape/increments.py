@@ -114,7 +114,7 @@ class Rewriting:
         return self.write("subtract", right, left) if minus_a else self.write("subtract", left, right)
 
     def same(self, line: int) -> int:
-        """The same operation on the new tape."""
+        """Write an operation unchanged on the new tape."""
         name, of, extra = self.tape[line]
         return self.write(name, *(self.plain(each) for each in of), extra=extra)
 
@@ -139,7 +139,7 @@ class Rewriting:
 
 
 def negated_sums(tape: Sequence[Operation]) -> tuple[list[Operation], list[int]]:
-    """The same tape with −(x + y) in place of (−x) − y, and the place of each line.
+    """Rewrite a tape with −(x + y) in place of (−x) − y; also the place of each line.
 
     Of −x and −y a tape writes (−x) − y or (−y) − x, whichever comes first. The result must not depend on that.
     """
@@ -166,7 +166,7 @@ def negated_sums(tape: Sequence[Operation]) -> tuple[list[Operation], list[int]]
 def increments_last(
     tape: Sequence[Operation], roots: Sequence[int], *, single: bool = False
 ) -> tuple[list[Operation], list[int]]:
-    """The same tape with increments multiplied last, and the lines of the roots on it; all lines are needed for the roots.
+    """Rewrite a tape with increments multiplied last; also the lines of the roots on it; all lines are needed for the roots.
 
     ``single`` is whether numbers have 32 bits.
 

@@ -98,7 +98,7 @@ def in_order(tape: Sequence[Operation], roots: Sequence[int]) -> dict[int, int]:
 
 
 def needed(tape: Sequence[Operation], roots: Sequence[int]) -> tuple[list[Operation], list[int]]:
-    """What the roots need, and nothing else."""
+    """The lines that the roots need, and nothing else."""
     place = in_order(tape, roots)
     lines = [tape[line]._replace(of=tuple(place[each] for each in tape[line].of)) for line in place]
     return lines, [place[root] for root in roots]

@@ -54,7 +54,7 @@ class Listing:
                         self.passed[self.place[each.id]] = True
 
     def is_choice(self, line: int) -> bool:
-        """Whether a line is a choice between two others by a mask, its first operand."""
+        """True if a line is a choice between two others by a mask, its first operand."""
         return self.operations[line].name == "choose" and line not in self.marks
 
     def _unknown(self, argument: Any) -> bool:

@@ -141,7 +141,7 @@ def _saturating(listing: Listing) -> list[Sequence[int]]:
 
 
 def _makes_nothing(factor: Any, change: Any) -> Any:
-    """Whether one is zero and the other infinite; None if never. Elsewhere a product with zero has derivatives of its own."""
+    """True where one is zero and the other infinite; None if never. Elsewhere a product with zero has derivatives of its own."""
     if not (isinstance(factor, Symbol) and isinstance(change, Symbol)):
         return None
     product = _times(factor, change)
@@ -250,7 +250,7 @@ def _depends(listing: Listing, bits: dict[int, int]) -> list[int]:
 
 
 def _backwards_is_shorter(listing: Listing, numbers: list[int]) -> bool:
-    """Whether the reverse mode takes fewer products than the forward mode."""
+    """True if the reverse mode takes fewer products than the forward mode."""
     bits: dict[int, int] = {}
     for j, each in enumerate(numbers):
         bits[each] = bits.get(each, 0) | (1 << j)

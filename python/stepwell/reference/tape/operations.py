@@ -22,7 +22,7 @@ Factor = Any
 
 
 class Kind(NamedTuple):
-    """What is known of an operation.
+    """The properties of an operation.
 
     Attributes:
         numbers: its meaning for NumPy's numbers; of an operation ``on_bits``, for whole numbers of as many bits.

@@ -1,4 +1,4 @@
-"""What ``fused=True`` does to a tape before products are fused: quotients by numbers become products.
+"""Change of a tape by ``fused=True`` before products are fused: quotients by numbers become products.
 
 A division takes as long as some ten products. With a fused multiply-add x/c is x·u + x·l rounded once, where u is 1/c cut and l
 what remains of it, rounded: two operations. The result is the quotient, correctly rounded, unless it is within 2⁻⁵¹ of a unit in
@@ -38,7 +38,7 @@ def inverse(c: float, single: bool = False) -> tuple[float, float] | None:
 def without_quotients(
     tape: Sequence[Operation], roots: Sequence[int], *, single: bool = False
 ) -> tuple[list[Operation], list[int]]:
-    """The same tape with products in place of quotients by numbers of what depends on the state, and the lines of the roots.
+    """Rewrite a tape with products in place of quotients of state-dependent values by numbers; also the lines of the roots.
 
     ``single`` is whether numbers have 32 bits. All lines are needed for the roots. A sign that is changed before the division is
     the number's instead.

@@ -1,4 +1,4 @@
-"""What ``fused=True`` does to a tape before products are fused: sums of two products are taken apart.
+"""Change of a tape by ``fused=True`` before products are fused: sums of two products are taken apart.
 
 a + (p·q + r·s) is a product, a fused multiply-add and a sum. As (a + p·q) + r·s it is two fused multiply-adds, and the product
 that is known last has one operation after it in place of three. So it is written, unless a depends on the state and is of a
@@ -14,7 +14,7 @@ SUMS = ("add", "subtract")
 
 
 def terms_apart(tape: Sequence[Operation], roots: Sequence[int]) -> tuple[list[Operation], list[int]]:
-    """The same tape with the terms of such sums in this order, and the lines of the roots. All lines are needed for the roots.
+    """Rewrite a tape with the terms of such sums in this order; also the lines of the roots. All lines are needed for the roots.
 
     Both products and their sum depend on the state and are read once. Of two such sums the one of the higher rank is taken apart.
     """
@@ -31,7 +31,7 @@ def terms_apart(tape: Sequence[Operation], roots: Sequence[int]) -> tuple[list[O
         return tape[line].name in SUMS and reads[line] == 1 and all(map(is_product, tape[line].of))
 
     def positive(is_minus: bool, line: int) -> tuple[bool, int]:
-        """Whether a value is subtracted, and its line, or that of what it is the negative of."""
+        """A flag for a value that is subtracted, and its line, or that of what it is the negative of."""
         turned = tape[line].name == "negate" and reads[line] == 1
         return is_minus != turned, tape[line].of[0] if turned else line
 

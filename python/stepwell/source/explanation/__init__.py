@@ -175,7 +175,6 @@ def _explained(plan: engine.Plan, attempt: bool) -> Explanation:
 
 
 def _kernel(machine: Any, plan: engine.Plan) -> Kernel:
-    """What a device runs."""
     from ...device import fixed, promise  # only such explanations need it
 
     promise.check(machine, single=plan.single)

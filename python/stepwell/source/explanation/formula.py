@@ -27,7 +27,7 @@ class Formula(NamedTuple):
 
     @property
     def is_negative(self) -> bool:
-        """Whether it begins with a sign that belongs to all of it."""
+        """True if it begins with a sign that belongs to all of it."""
         return self.text.startswith("−") and self.holds in (PRODUCT, SIGN)
 
     def within(self, holds: int) -> str:

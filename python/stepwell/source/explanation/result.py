@@ -67,7 +67,7 @@ class MachineCode(ValueEquality):
 
 @dataclass(frozen=True)
 class Packing(ValueEquality):
-    """Whether one vector makes several equal operations of a single member, and why. Cycles are those of a model of the CPU.
+    """The packing of equal operations of a single member into vectors, and its gain. Cycles are those of a model of the CPU.
 
     Attributes:
         used: whether operations are packed into vectors, which they are if that saves 4 % of the cycles.
@@ -108,7 +108,7 @@ class Packing(ValueEquality):
 
 @dataclass(frozen=True)
 class Kernel(ValueEquality):
-    """What a device runs.
+    """The kernels that a device runs.
 
     Attributes:
         device: the name of the device, such as "opencl:0".
@@ -367,5 +367,5 @@ def _members(count: int) -> str:
 
 
 def _names(name: str, text: str) -> bool:
-    """Whether a name occurs in a text: by itself, or with a number or a place behind it."""
+    """True if a name occurs in a text: by itself, or with a number or a place behind it."""
     return re.search(rf"(?<![\w.]){name}(?:\d+|\[|\(|(?![\w.']))", text) is not None

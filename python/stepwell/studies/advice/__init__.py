@@ -70,7 +70,7 @@ _named = cache(find_scene)
 
 
 def knows_motion(method: Method, system: System) -> bool:
-    """Whether every step is exact, however long: Kepler's motion of two bodies alone."""
+    """True if every step is exact, however long: Kepler's motion of two bodies alone."""
     return method.splits and isinstance(system, NBody) and system.force == "newton" and len(system.masses) == 2
 
 

@@ -73,10 +73,10 @@ class Candidate(Protocol):
         """This k, or the least larger one with which a linear system does not blow up, nor with somewhat longer steps."""
 
     def keeps_margin(self, k: int) -> bool:
-        """Whether runs with somewhat longer steps do not blow up."""
+        """True if runs with somewhat longer steps do not blow up."""
 
     def possible(self, k: int) -> bool:
-        """Whether there is such a run."""
+        """True if there is a run with that k."""
 
     def described(self, k: int) -> str:
         """The steps or the tolerance of k, in words."""
@@ -114,11 +114,11 @@ class Fixed:
         return max(k, math.ceil(self.grid.span / longest_step(self.trials, self.method)))
 
     def keeps_margin(self, k: int) -> bool:
-        """Whether runs with somewhat longer steps do not blow up."""
+        """True if runs with somewhat longer steps do not blow up."""
         return keeps_margin(self.trials, self.method, self.grid.dt(k))
 
     def possible(self, k: int) -> bool:
-        """Whether a step still moves the time."""
+        """True if a step still moves the time."""
         return self.grid.steps(k) < 2**52
 
     def described(self, k: int) -> str:
@@ -147,12 +147,12 @@ class Single(Fixed):
         self.name, self.wide, self.allowed = single_name(method), wide, allowed
 
     def possible(self, k: int) -> bool:
-        """Whether the step is a normal number of float32, and rounding was not too large already with fewer steps."""
+        """True if the step is a normal number of float32, and rounding was not too large already with fewer steps."""
         before = max((n for n in self.seen if n < k), default=None)
         return super().possible(k) and self.grid.dt(k) >= LEAST_SINGLE_STEP and (before is None or not self.is_rounding(before))
 
     def is_rounding(self, k: int) -> bool:
-        """Whether rounding alone makes the error of the run with that k too large.
+        """True if rounding alone makes the error of the run with that k too large.
 
         The states of the two precisions differ by rounding only, and by at least as much as their errors do.
         """
@@ -201,7 +201,7 @@ class Adaptive:
         return self.trials.confirm(self.method, self.tolerance(k))
 
     def measured(self, k: int) -> Trial:
-        """The same of a run that need not be good enough."""
+        """The run with that k, measured as by ``confirm``; it need not be good enough."""
         return self.trials.measured(self.method, self.tolerance(k))
 
     def within_limit(self, k: int) -> int:
@@ -213,7 +213,7 @@ class Adaptive:
         return True
 
     def possible(self, k: int) -> bool:
-        """Whether the tolerance is above the rounding."""
+        """True if the tolerance is above the rounding."""
         return self.tolerance(k) >= LEAST_TOLERANCE
 
     def described(self, k: int) -> str:

@@ -34,7 +34,7 @@ class Spending:
         )
 
     def fits(self, candidate: Candidate, k: int, budget: float | None) -> bool:
-        """Whether the most expensive frame keeps the budget."""
+        """True if the most expensive frame keeps the budget."""
         return budget is None or self.longest(candidate, k) <= budget
 
     def steps(self, candidate: Candidate, budget: float | None) -> float:

@@ -160,7 +160,7 @@ def longest_step(trials: Trials, method: Method) -> float:
 
 
 def keeps_margin(trials: Trials, method: Method, dt: float) -> bool:
-    """Whether runs with steps up to ``MARGIN`` times as long do not blow up either; for a linear system, by its limit."""
+    """True if runs with steps up to ``MARGIN`` times as long do not blow up either; for a linear system, by its limit."""
     horizon = trials.scene.horizon
     steps = (math.floor(horizon / (dt * ratio)) for ratio in (MARGIN, math.sqrt(MARGIN)))
     return trials.scene.system.linear or not any(trials.unstable(method, horizon / n, n) for n in steps if n)

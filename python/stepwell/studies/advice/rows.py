@@ -97,7 +97,7 @@ class Row:
 
     @property
     def is_robust(self) -> bool:
-        """Whether slightly more steps are good enough too."""
+        """True if slightly more steps are good enough too."""
         if self.tolerance is not None:
             return self.robust is not None and self.robust >= self.tolerance
         return self.robust is not None and self.robust <= (self.steps if self.substeps is None else self.substeps)

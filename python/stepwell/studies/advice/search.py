@@ -136,15 +136,15 @@ class Search:
         return self.tolerance * candidate.share
 
     def good(self, candidate: Candidate, k: int) -> bool:
-        """Whether a run is good enough."""
+        """True if a run is good enough."""
         return candidate.look(k).error <= self.allowed(candidate)
 
     def confirmed(self, candidate: Candidate, k: int) -> bool:
-        """Whether the run is good enough at every step."""
+        """True if the run is good enough at every step."""
         return self.good(candidate, k) and candidate.confirm(k).error <= self.allowed(candidate)
 
     def affordable(self, candidate: Candidate, k: int, known: int) -> bool:
-        """Whether the run is short enough to be tried, judged by the run with ``known``."""
+        """True if the run is short enough to be tried, judged by the run with ``known``."""
         trial = candidate.look(known)
         return candidate.possible(k) and trial.steps * candidate.evaluations * (k / known) <= self.most
 
@@ -341,7 +341,7 @@ class Search:
         return max(IRREGULAR_POINTS[0], min(IRREGULAR_POINTS[1], int(IRREGULAR_SHARE * self.longest / evaluations)))
 
     def very_long(self, candidate: Candidate, k: int) -> bool:
-        """Whether a run takes so long that only a few more like it are possible."""
+        """True if a run takes so long that only a few more like it are possible."""
         return candidate.look(k).steps * candidate.evaluations > HALVED_RUN_SHARE * self.longest
 
     def halved(self, candidate: Candidate, k: int, best: float) -> int | None:

@@ -15,7 +15,7 @@ from .predict import Rates
 
 @dataclass(frozen=True)
 class Stiff:
-    """What stability leaves to explicit methods where a motion is stiff.
+    """The stability limit of explicit methods where a motion is stiff.
 
     Attributes:
         rate: size of the fastest rate along the true motion that does not grow, in 1 per unit of time.
@@ -56,7 +56,7 @@ def stiff_of(best: Method, dt: float, rates: Rates | None, explicit: Iterable[Me
 
 
 def _is_of_one_kind(method: Method) -> bool:
-    """Whether an explicit method treats v and y alike, so that a single rate says how long its steps may be."""
+    """True if an explicit method treats v and y alike, so that a single rate says how long its steps may be."""
     if method.is_implicit:
         return False
     try:

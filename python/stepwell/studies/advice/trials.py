@@ -57,7 +57,7 @@ class Trial(NamedTuple):
 
     @property
     def stopped(self) -> bool:
-        """Whether a part of the run was omitted."""
+        """True if a part of the run was omitted."""
         return self.share < 1.0
 
 
@@ -122,7 +122,7 @@ class Trials:
         return self._dense[key]
 
     def unstable(self, method: Method, dt: float, steps: int) -> bool:
-        """Whether the run grew and has no correct digit. The true motion is computed only if it grew."""
+        """True if the run grew and has no correct digit. The true motion is computed only if it grew."""
         key = (method.name, steps, dt)
         if key in self._done and not self._done[key].stopped:
             return self._done[key].unstable

@@ -91,7 +91,7 @@ class Point(ValueEquality):
 
     @property
     def usable(self) -> bool:
-        """Whether it is stable and its error is at most 1."""
+        """True if it is stable and its error is at most 1."""
         return not self.unstable and self.state_error <= 1.0
 
 

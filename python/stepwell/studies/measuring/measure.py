@@ -71,7 +71,7 @@ def assess(scene: Scene, method: Method, dt: float, steps: int, fused: bool = Fa
 
 
 def grew(amplitude: Array, half: int) -> bool:
-    """Whether the amplitude of a run grows in its second half, which begins at state ``half``."""
+    """True if the amplitude of a run grows in its second half, which begins at state ``half``."""
     # An amplitude that is not above the exact one does not count, since a driven system may start small. NaN is above everything.
     return not amplitude[half:].max() <= MIN_GROWTH * max(1.0, float(amplitude[: max(1, half)].max()))
 

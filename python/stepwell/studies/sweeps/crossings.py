@@ -163,7 +163,7 @@ class _States:
         self.value = value - outcome.level
         a, b = self.value[:-1], self.value[1:]
         rising, falling = (a < 0.0) & (b >= 0.0), (a > 0.0) & (b <= 0.0)
-        #: Whether the level is passed after each state but the last, shape (states − 1, members).
+        #: True where the level is passed after each state but the last, shape (states − 1, members).
         self.mask: Mask = {1: rising, -1: falling, 0: rising | falling}[outcome.direction]
 
     def times(self, k: Whole, members: Mask) -> Array:

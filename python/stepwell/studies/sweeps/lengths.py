@@ -20,12 +20,12 @@ from .outcomes import Extremes, Last, Outcome
 #: The most numbers of a state: the step is one tape, whatever it would be with one length.
 MOST_NUMBERS = 32
 
-#: What changes operations by the length of a step, or is computed in Python from it.
+#: Options that change operations by the length of a step, or are computed in Python from it.
 WITH_ONE_LENGTH = ("control", "force", "events", "dtype")
 
 
 def together(system: System, method: Method, outcomes: tuple[Outcome, ...], options: dict[str, Any]) -> bool:
-    """Whether members that have fixed steps of their own are stepped together, with the bits that each has alone."""
+    """True if members that have fixed steps of their own are stepped together, with the bits that each has alone."""
     simple = not options["fused"] and not any(name in options for name in WITH_ONE_LENGTH)
     bare = not system.around and system.mass_matrix is None and not method.is_exact
     held = any(isinstance(each, Sampled) for each in system.all_inputs().values())
@@ -34,7 +34,7 @@ def together(system: System, method: Method, outcomes: tuple[Outcome, ...], opti
 
 
 def _sees_states_alone(outcome: Outcome) -> bool:
-    """Whether it needs neither times nor the length of a step."""
+    """True if an outcome needs neither times nor the length of a step."""
     if isinstance(outcome, Extremes):
         return outcome.of is None or isinstance(outcome.of, tuple) or outcome.of in ("v", "y")
     return isinstance(outcome, Last)

@@ -98,7 +98,7 @@ class Rows:
 
 
 class Observed(NamedTuple):
-    """What a device has made of all observed states of a run of a chunk of members.
+    """The results of a device for all observed states of a run of a chunk of members.
 
     Attributes:
         run: the run, with the last state alone.
@@ -189,7 +189,7 @@ def block_dims(system: System, block: str) -> tuple[str, ...]:
 
 
 def has_rates(what: Of) -> bool:
-    """Whether the rate of change of a quantity is one of the system: of v, y, or a component."""
+    """True if the rate of change of a quantity is one of the system: of v, y, or a component."""
     return isinstance(what, tuple) or what in ("v", "y")
 
 

@@ -25,7 +25,7 @@ from .outcomes import ReducedOutcome, Reduction
 
 
 class Observing(NamedTuple):
-    """What a device does with the states of a chunk.
+    """The reductions that a device makes of the states of a chunk.
 
     Attributes:
         observer: its reductions.
@@ -44,7 +44,7 @@ class Observing(NamedTuple):
 
 
 def observing(outcomes: Iterable[ReducedOutcome], rows: Rows, every: int) -> Observing | None:
-    """What a device does with states for these outcomes, or None if one of them must see them, or none does."""
+    """The reductions on a device for these outcomes, or None if one of them must see the states, or none observes them."""
     reductions = [each.on_device(rows) for each in outcomes if each.observes]
     if not reductions or None in reductions:
         return None
@@ -58,7 +58,7 @@ def run(system: System, method: Method, *, observer: Observer | None = None, **o
 
 
 def is_of_many_bodies(system: System, method: Method, start: dict[str, Any]) -> bool:
-    """Whether a device makes the run by kernels for many bodies, which save states."""
+    """True if a device makes the run by kernels for many bodies, which save states."""
     if system.kernel != "nbody":
         return False
     dt = {name: float(np.ravel(start[name])[0]) for name in ("dt",) if name in start}  # the members may have their own

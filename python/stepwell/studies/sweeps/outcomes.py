@@ -95,7 +95,7 @@ class ReducedOutcome(Outcome, ABC):
         """A new reduction."""
 
     def on_device(self, rows: Rows) -> Any:
-        """The same reduction on a device, of ``device.reductions``; None if it needs the states here."""
+        """The device's form of the reduction, of ``device.reductions``; None if it needs the states here."""
         return None
 
 
@@ -199,7 +199,7 @@ class Extremes(_Several):
         return _Extremes(self)
 
     def on_device(self, rows: Rows) -> Any:
-        """The same reduction on a device."""
+        """The device's form of the reduction."""
         from ...device.reductions import Extremes as OnDevice
 
         of = self.rows(rows)
@@ -262,7 +262,7 @@ class Mean(_Several):
         return _Mean(self)
 
     def on_device(self, rows: Rows) -> Any:
-        """The same reduction on a device."""
+        """The device's form of the reduction."""
         from ...device.reductions import Sums
 
         of = self.rows(rows)

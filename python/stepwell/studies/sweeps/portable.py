@@ -47,7 +47,7 @@ def packed(task: Task) -> bytes:
 
 
 def _found_by_name(definition: Definition) -> bool:
-    """Whether another process can import the definition by name; it cannot import the script that was started."""
+    """True if another process can import the definition by name; it cannot import the script that was started."""
     if definition.__module__ == "__main__":
         return False
     value: Any = sys.modules.get(definition.__module__)

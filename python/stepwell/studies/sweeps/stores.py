@@ -43,7 +43,7 @@ class Memory:
         self.about: dict[str, Planned] = {}
 
     def finished(self, chunk: Chunk) -> bool:
-        """Whether the results of a chunk are there already."""
+        """True if the results of a chunk are there already."""
         return False
 
     def write(self, chunk: Chunk, results: Results) -> None:
@@ -121,7 +121,7 @@ class Zarr:
         )
 
     def finished(self, chunk: Chunk) -> bool:
-        """Whether the results of a chunk are there and whole."""
+        """True if the results of a chunk are there and whole."""
         if self.group is None:
             return False
         try:
@@ -233,7 +233,7 @@ class NetCDF(Zarr):
         super().__init__(unfinished, layout, chunk_shape)
 
     def finished(self, chunk: Chunk) -> bool:
-        """Whether the results of a chunk are there and whole."""
+        """True if the results of a chunk are there and whole."""
         return self.whole or super().finished(chunk)
 
     def finish(self) -> Any:

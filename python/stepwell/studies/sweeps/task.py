@@ -92,12 +92,12 @@ class Task(NamedTuple):
 
     @property
     def single(self) -> bool:
-        """Whether steps are computed in float32."""
+        """True if steps are computed in float32."""
         return self.options.get("dtype") == "float32"
 
     @property
     def on_device(self) -> bool:
-        """Whether a device makes the steps, and not the CPU."""
+        """True if a device makes the steps, and not the CPU."""
         return bool(self.options.get("device", "cpu") != "cpu")
 
     def rounded(self, dt: Array) -> Array:
@@ -274,7 +274,7 @@ def _reduced(
 
 
 def _observing(task: Task, system: System, start: dict[str, Any]) -> Observing | None:
-    """What a device does with the states that it observes, or None if they are to be seen here."""
+    """The reductions of the states that a device observes, or None if they are to be seen here."""
     if not task.on_device or "events" in task.options or task.kinds(History):
         return None
     from . import on_device

@@ -39,7 +39,7 @@ RIGHT = 0.01
 
 @dataclass(frozen=True, eq=False)
 class MethodResponse(ValueEquality):
-    """What a method makes of the response; arrays are of shape (n,).
+    """The response with the steps of a method; arrays are of shape (n,).
 
     Attributes:
         method: the method.

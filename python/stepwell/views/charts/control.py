@@ -64,7 +64,7 @@ class ControlSweep(Drawn, Table, ValueEquality):
 
     @property
     def keeps_lengths(self) -> bool:
-        """Whether the lengths of rods are controlled, and not an energy."""
+        """True if the lengths of rods are controlled, and not an energy."""
         return self.system.constraint == "length"
 
     def line(self, method: Method | str, kind: str, evaluations: int | None = None) -> Held:

@@ -84,7 +84,7 @@ def finding(chart: Stability) -> str:
 
 
 def _kept(locus: Locus) -> bool:
-    """Whether the energy does not change below the limit."""
+    """True if the energy does not change below the limit."""
     below = locus.phi < (locus.limit or np.inf)
     return bool(locus.limit) and bool((np.abs(locus.r1_squared[below] - 1.0) < KEPT).all())
 

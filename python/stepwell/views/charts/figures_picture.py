@@ -235,7 +235,7 @@ def _largest(axes: Axes, y: Array) -> None:
 
 
 def in_words(samples: Samples) -> str:
-    """What a method makes of energy and frequency."""
+    """The effect of a method on energy and frequency, in words."""
     if not math.isfinite(samples.ratio) or "double eigenvalue" in samples.kind:
         return samples.kind
     change, turn = samples.r1_squared - 1.0, samples.ratio - 1.0

@@ -121,7 +121,7 @@ def _coarse(pixels: Pixels) -> Any:
 
 
 def _palette(samples: Sequence[Pixels], number: int) -> tuple[Pixels, Pixels]:
-    """That many colours, and which of them each coarse colour is."""
+    """The colours of a palette of this size, and the place in it of each coarse colour."""
     from PIL import Image
 
     counts = np.bincount(np.concatenate([_coarse(each).ravel() for each in samples]), minlength=1 << 3 * BITS)

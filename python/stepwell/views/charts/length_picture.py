@@ -12,7 +12,7 @@ from .control import ControlSweep
 from .control_runs import Held
 from .style import GREY, Axes, Figure, apart, page
 
-#: What is exact has no place on a logarithmic axis.
+#: Least error drawn: zero has no place on a logarithmic axis.
 LEAST_DRAWN = 1e-17
 
 #: The lines of the two, told apart without colour.
@@ -108,7 +108,6 @@ def _limits(axes: Axes, chart: ControlSweep, what: str) -> None:
 
 
 def _legend(figure: Figure, chart: ControlSweep) -> None:
-    """What markers and lines mean."""
     from matplotlib.lines import Line2D
 
     handles: list[Any] = [Line2D([], [], **(_look(chart, line.method) | CONTROL)) for line in _firsts(chart)]

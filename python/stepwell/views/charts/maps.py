@@ -172,7 +172,7 @@ class StabilityMap(Table, ValueEquality):
 
 @dataclass(frozen=True, eq=False)
 class Observation(ValueEquality):
-    """What the points of a map do when they are stepped, beside what their eigenvalues say.
+    """The behaviour of a map's points when they are stepped, beside what their eigenvalues say.
 
     Attributes:
         map: of which.

@@ -67,12 +67,12 @@ def draw_orbits(figure: Figure, chart: RunPicture) -> list[str]:
 
 
 def hanging(chart: RunPicture) -> bool:
-    """Whether points in space hang on something or on each other, so that they are seen from the front and not along an axis."""
+    """True if points in space hang on something or on each other, so that they are seen from the front and not along an axis."""
     return bool(chart.places.shape[2] == 3 and (len(chart.links) or chart.fixed_points))
 
 
 def is_net(chart: RunPicture) -> bool:
-    """Whether the points are the knots of a net, which are drawn without their paths."""
+    """True if the points are the knots of a net, which are drawn without their paths."""
     return bool(chart.links.size and chart.places.shape[1] > len(BODIES))
 
 
@@ -133,7 +133,7 @@ def _turns(places: Array, exact: Array) -> Array:
 
 
 def turning(chart: RunPicture) -> bool:
-    """Whether bodies circle the centre in one direction, which makes their distance from it a function of the angle."""
+    """True if bodies circle the centre in one direction, which makes their distance from it a function of the angle."""
     exact = chart.exact_places
     if exact is None or not isinstance(chart.run.system, NBody) or exact.shape[2] != 2:
         return False
@@ -166,7 +166,7 @@ def radii(axes: Axes, chart: RunPicture) -> None:
 
 
 def one_curve(chart: RunPicture) -> bool:
-    """Whether several bodies follow each other on one curve, where the last one drawn would hide the others."""
+    """True if several bodies follow each other on one curve, where the last one drawn would hide the others."""
     exact = chart.exact_places
     if exact is None or chart.scene.period is None or not 1 < exact.shape[1] <= len(BODIES):
         return False
@@ -178,7 +178,7 @@ def one_curve(chart: RunPicture) -> bool:
 
 
 def crowded(chart: RunPicture, size: float) -> bool:
-    """Whether the paths are so long, relative to the side of the picture, that they are drawn thin."""
+    """True if the paths are so long, relative to the side of the picture, that they are drawn thin."""
     y = np.clip(chart.places[chart.finite], -LARGEST, LARGEST)
     with np.errstate(all="ignore"):
         way = float(np.linalg.norm(np.diff(y, axis=0), axis=2).sum(axis=0).max())

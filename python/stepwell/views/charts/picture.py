@@ -258,7 +258,7 @@ def _text(figure: Figure, chart: WorkPrecision, error: str, time: str, unnamed: 
 
 
 def has_implicit(chart: WorkPrecision) -> bool:
-    """Whether evaluations are less than the work of some method: it solves equations, too."""
+    """True if evaluations are less than the work of some method: it solves equations, too."""
     return any(getattr(curve.method, "is_implicit", False) for curve in chart.curves)
 
 

@@ -189,7 +189,7 @@ class Points:
     name: str = ""  # from where it is seen, in space
 
     def leave(self, half: float) -> bool:
-        """Whether a point leaves the square whose sides have this distance from the centre."""
+        """True if a point leaves the square whose sides have this distance from the centre."""
         return bool((np.abs(self.places - self.centre) > half).any())
 
 
@@ -213,7 +213,7 @@ def view_of(chart: RunPicture) -> Points:
 
 
 def is_hanging(chart: RunPicture) -> bool:
-    """Whether points in space hang on springs, rods or fixed points."""
+    """True if points in space hang on springs, rods or fixed points."""
     return chart.places.shape[2] == 3 and bool(len(chart.links) or chart.fixed_points)
 
 

@@ -108,7 +108,7 @@ class RunPicture(Drawn, Table, ValueEquality):
 
     @cached_property
     def before(self) -> RunPicture | None:
-        """The same run without its control, from the first saved state on; None without a control, or where it is long."""
+        """A run without the control, from the first saved state on; None without a control, or where it is long."""
         run = self.run
         if run.system.keeper is None or run.paces is not None or run.events or run.steps * run.v[0].size > MAX_RERUN:
             return None
@@ -266,7 +266,7 @@ def own_picture(run: Run) -> RunPicture:
 
 
 def _begins(scene: Scene, run: Run) -> bool:
-    """Whether the first state is the scene's start, up to the rounding of methods that compute v from what they carry.
+    """True if the first state is the scene's start, up to the rounding of methods that compute v from what they carry.
 
     In float32 the start itself is rounded, by up to 2⁻²⁴ of a number.
     """

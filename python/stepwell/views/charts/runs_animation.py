@@ -34,7 +34,7 @@ MOST_FRAMES = 20_000
 SIZE, DPI = (12.8, 7.2), 1000.0 / 12.8
 ALONE, LOWEST = 9.0, 4.0
 
-#: What is above and below a motion alone, in inches.
+#: Room above and below a motion alone, in inches.
 ABOVE, BELOW = 1.25, 0.7
 
 #: The colour of springs and rods. More than MANY_LINKS are thin; of more particles than MOST_MARKED only the springs are drawn.
@@ -46,7 +46,7 @@ BUNCH = 2000
 #: Shows a saved state.
 Show = Callable[[int], None]
 
-#: What shows the motion, what moves on the figure, and the panels over time.
+#: Function that shows the motion, parts that move on the figure, and panels over time.
 Motion = tuple[Show, list[Any], list[Axes]]
 
 

@@ -1,4 +1,4 @@
-"""What a run shows, in a few words: the second half of the title of its picture, and of the verdict of the command line."""
+"""Finding of a run, in a few words: the second half of the title of its picture, and of the verdict of the command line."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ MOST_DIGITS = 15
 #: An angle that changes by less, in degrees, over this last share of the run has settled.
 SETTLED, LAST_SHARE = 0.5, 0.1
 
-#: What constraints keep is no energy.
+#: Constraints that keep something else than the energy.
 CONSTRAINTS = ("length", "norm")
 
 #: A run within this share of the orbit's size is on it; the number of states that are looked at, and the least share of a period
@@ -111,7 +111,7 @@ def _of_energy(error: Array, energy: Array) -> str:
 
 
 def _of_control(chart: RunPicture, before: RunPicture) -> str:
-    """What the control changed, beside the same run without it; nothing where it is not the energy that it keeps.
+    """The effect of the control, beside the same run without it; nothing where it is not the energy that it keeps.
 
     Medians of the saved states are compared: at a close encounter the largest error may be the same with and without control.
     """

@@ -118,7 +118,7 @@ def main_axis(chart: RunPicture) -> int:
 
 
 def upright_by_momentum(chart: RunPicture) -> bool:
-    """Whether the angular momentum at the start is drawn upright: a body without a vertical of its own."""
+    """True if the angular momentum at the start is drawn upright: a body without a vertical of its own."""
     system: Any = chart.run.system
     return system.weight is None and system.space_torque is None and bool(momentum(chart).any())
 

@@ -271,7 +271,6 @@ def finding(chart: Stability) -> str:
 
 
 def _colour(same: tuple[Locus, ...]) -> str:
-    """That of the family, if all are of one."""
     families = {family(locus.method) for locus in same}
     return FAMILIES[families.pop()] if len(families) == 1 else "black"
 

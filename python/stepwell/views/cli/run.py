@@ -40,7 +40,7 @@ SAVED_ADAPTIVE, SAVED_ADAPTIVE_TO_DRAW = 100, 2000
 #: Digits of a number and of an error on the screen, and the most numbers of a block there.
 DIGITS, DIGITS_OF_AN_ERROR, MOST_SHOWN = 8, 3, 12
 
-#: What the screen calls numbers of the report, where JSON has another name.
+#: Names on the screen of numbers of the report, where JSON has another name.
 SCREEN_NAMES = {"kept": "saved states"}
 
 NUMBERS, PICTURES = (".csv", ".npz"), (".png", ".svg", ".pdf")

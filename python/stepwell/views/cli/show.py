@@ -43,7 +43,7 @@ def warn(message: str) -> None:
 
 
 def has_colours() -> bool:
-    """Whether standard output is a terminal that shows colours, and the user wants them."""
+    """True if standard output is a terminal that shows colours, and the user wants them."""
     return not os.environ.get("NO_COLOR") and os.environ.get("TERM") != "dumb" and shows_escapes(sys.stdout)
 
 

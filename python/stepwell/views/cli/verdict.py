@@ -19,7 +19,7 @@ STOPPED = {
 
 
 def verdict(picture: RunPicture) -> str:
-    """Whether the run followed the motion, in a few words, and the number that shows it."""
+    """A verdict, in a few words, on whether the run followed the motion, and the number that shows it."""
     run = picture.run
     if run.status:
         step = int(run.first_bad_step)

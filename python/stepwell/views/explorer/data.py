@@ -50,13 +50,13 @@ SAMPLES, MAX_SIZE_STEPS, SHARE_LEFT_OUT = 1000, 20_000, 0.005
 #: The tolerance of that run of a stiff scene.
 SIZE_TOLERANCE = 1e-6
 
-#: What a step of the run that is the truth may change when its parts are halved, and of the run that it is checked by; by DOP853,
+#: Changes allowed to a step of the run that is the truth when its parts are halved, and of the run that checks it; by DOP853,
 #: and by methods of lower order.
 TIGHT, LOOSE = (1e-11, 1e-9), (1e-9, 1e-7)
 
 #: The longest step that goes into a page, in characters; and in operations, which are counted before a step is written.
 MAX_SOURCE, MAX_OPERATIONS = 400_000, 80_000
-#: The same of a step that solves equations: seven methods have such steps, and those of many unknowns would be most of a page.
+#: Limits of a step that solves equations: seven methods have such steps, and those of many unknowns would be most of a page.
 MAX_SOLVING, MAX_UNKNOWNS = 14_000, 8
 
 
@@ -118,7 +118,7 @@ def of_scene(scene: Scene, methods: Sequence[Method]) -> dict[str, Any]:
 
 
 def built_in(scene: Scene) -> bool:
-    """Whether it is a built-in scene made without arguments, for which the sliders are meant."""
+    """True if it is a built-in scene made without arguments, for which the sliders are meant."""
     if scene.name not in sliders.OFFERS:
         return False
     return scene == (sliders.rope() if scene.name == "rope" else find_scene(scene.name))

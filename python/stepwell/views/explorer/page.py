@@ -177,7 +177,7 @@ def script() -> str:
 
 
 def in_notebook() -> bool:
-    """Whether a notebook shows the value of a cell's last expression."""
+    """True if a notebook shows the value of a cell's last expression."""
     shell = sys.modules.get("IPython")
     running = shell.get_ipython() if shell is not None else None
     return running is not None and hasattr(running, "kernel")

@@ -1,4 +1,4 @@
-"""What the page offers for each built-in scene: two methods that tell something, sliders, speed, the formula of the motion.
+"""Offers of the page for each built-in scene: two methods that tell something, sliders, speed, the formula of the motion.
 
 A slider sets numbers by their *paths*: ``m.omega`` a parameter of the exported step, ``m.Gm[1]`` an element of one, ``m.mass[*]``
 all of one; ``e.`` likewise of the energy, ``v`` and ``y`` of the start. Each is set to the slider's value times a factor.
@@ -41,7 +41,7 @@ class Slider:
 
 @dataclass(frozen=True)
 class Offer:
-    """What the page offers for a scene.
+    """The offer of the page for a scene.
 
     Attributes:
         sliders: the sliders.
