@@ -3,7 +3,7 @@
     python -m benches.calls
 
 Processor time of one thread in microseconds, the least of some turns. *Other numbers*: `integrate` of a system that is made anew
-for each call, with a number that it never had. *Steps*: what the core takes of it. Beside them a compiled function of numba, which
+each call, with a number that it never had. *Steps*: what the core takes of it. Beside them a compiled function of numba, which
 takes numbers as arguments and makes the same steps in a loop, and SciPy's solver.
 """
 

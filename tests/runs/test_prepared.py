@@ -324,7 +324,7 @@ def test_starts_of_either_precision_are_taken(of_start: Any, dtype: str, monkeyp
     got = run._short.run(v, y)
     assert got is not None
     assert_same(got, expected)
-    monkeypatch.setattr("stepwell.runs.prepared._short_run", None)
+    monkeypatch.setattr("stepwell.runs.prepared.short_run_of_request", None)
     for _ in range(2):
         assert_same(run(v.tolist(), y.tolist()), whole(system, "rk4", v=v.tolist(), y=y.tolist(), dtype=dtype, **DT))
 
