@@ -96,7 +96,7 @@ def of_extra_steps(plan: engine.Plan, evaluations: int, *, dense: bool) -> int:
 
 
 def paces_of(plan: engine.Plan, numbers: Array, evaluations: int, of_extra: int | None = None) -> Paces:
-    """What a run tells of the step-size controllers; its attempts make so many function evaluations, and its extra steps."""
+    """The step-size controllers as a run reports them; an attempt makes so many evaluations, an extra step ``of_extra``."""
     accepted, rejected, extra_steps = numbers[engine.COUNTS].astype(np.int64)
     # A series needs no further evaluation for the states within a step, unless operations are fused.
     again = numbers[engine.HELD] > 0.0 if plan.method.has_series and not plan.fused else extra_steps

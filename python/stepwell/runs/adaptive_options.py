@@ -79,7 +79,7 @@ def check_estimates(system: System, method: Method, control: Any, options: Optio
 
 
 def is_backward(times: Array, t0: Array) -> bool:
-    """Whether the last times are before the start, the same for all members."""
+    """True if the last times are before the start, the same for all members."""
     if times.ndim == 1 and not t0.ndim and times[-1] > t0:
         return False  # the most frequent case
     ahead = times[-1] - t0

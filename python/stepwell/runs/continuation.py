@@ -56,7 +56,7 @@ class Continuation(NamedTuple):
         return self.y.shape[len(self.system.y_shape) :]
 
     def remembered(self, system: System, batch: Shape) -> Array | None:
-        """What the controller of a system remembers, if it is the one of this system, with the same period and delay in steps.
+        """The memory of the controller of a system, if it is the one of this system, with the same period and delay in steps.
 
         Its parameters, the system's and the state may be others.
         """
@@ -70,7 +70,7 @@ class Continuation(NamedTuple):
         return np.array(np.broadcast_to(memory, (len(memory), *batch)), dtype=np.float64)
 
     def holds(self, system: System, batch: Shape, v: Array, y: Array, force: Array | None = None) -> bool:
-        """Whether the carry holds for a system and a state, which it does if all of their bits are the same as here.
+        """True if the carry holds for a system and a state, which it does if all of their bits are the same as here.
 
         With adaptive steps ``force`` counts, too, since it acted in the held step.
         """
@@ -126,7 +126,7 @@ def _of_run(run: Run, goes_on_stopped: bool) -> Continuation:
 
 
 def _parted(system: System, method: Method, dt: float, carry: Array | None) -> tuple[Array | None, Array | None]:
-    """What a method carries, and what a sampled controller remembers behind it."""
+    """The carry of a method, and behind it the memory of a sampled controller."""
     if carry is None or system.controller is None:
         return carry, None
     numbers = system.controller.over_steps(dt).remembers(system)

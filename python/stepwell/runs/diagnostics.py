@@ -139,7 +139,7 @@ def lost_equations(of: Run | engine.Plan, start: Moment, end: Moment, sizes: Arr
 
 
 def finds_growth_only(system: System, method: Method, steps: int) -> bool:
-    """Whether nothing but growth can be found of a run of fixed steps, from its start, of which all numbers are finite."""
+    """True if nothing but growth can be found of a run of fixed steps, from its start, of which all numbers are finite."""
     judged = known_energy.may_pass_barriers(system, method, steps) or known_energy.may_gain(system, method, steps)
     judged = judged or isinstance(system, NBody) or system.mass_matrix is not None or system.keeper is not None
     return type(system).doubt is System.doubt and not judged
@@ -193,7 +193,7 @@ def _only(run: Run, index: Shape) -> Any:
 
 
 def _velocities(request: Request) -> Array:
-    """Those at the start of a run, behind which stands what a method keeps in one that goes on."""
+    """The velocities at the start of a run; behind them stand the blocks that a method keeps, in one that goes on."""
     plan, v = request.plan, request.v
     if not (request.carried and plan.keeps):
         return v
@@ -252,7 +252,7 @@ def why_steps_are_short(run: Run, request: Request, waypoints: Sequence[Array], 
 
 
 def may_be_stiff(steps: int, numbers: int) -> bool:
-    """Whether a run of so many accepted steps, whose members have so many numbers in all, is looked at for stiffness."""
+    """True if a run of so many accepted steps, whose members have so many numbers in all, is looked at for stiffness."""
     return steps >= MANY_OF_FEW or (steps >= MANY and numbers >= FEW_NUMBERS)
 
 

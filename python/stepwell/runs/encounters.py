@@ -145,7 +145,7 @@ def _hill(masses: Array, i: Any, j: Any) -> Any:
 
 
 def may_come_near(bodies: NBody, v: Array, y: Array) -> Any:
-    """Whether the orbits of two bodies around the first one reach places within HILL_RADII of each other.
+    """True if the orbits of two bodies around the first one reach places within HILL_RADII of each other.
 
     Truths for every member; blocks have the shape (bodies, dim, *batch). Only the least and the largest distance from the first
     body are compared, so orbits that are apart by their inclination or their resonance count, too.
@@ -226,7 +226,7 @@ def overshoots(
 
 
 def may_meet(bodies: NBody, h: float, time: float, v: Any, y: Any) -> bool:
-    """Whether two bodies of one state, left to each other, would pass each other within a step; all in lists of floats.
+    """True if two bodies of one state, left to each other, would pass each other within a step; all in lists of floats.
 
     A pair with relative angular momentum L has the speed L/r at its nearest point, and turns there by a right angle in a step if
     h·L/(2r) = √(r² + ε²). It comes nearer than this r if its energy suffices.

@@ -16,7 +16,7 @@ from ..model.systems import System
 
 @by_value
 class Finding(NamedTuple):
-    """What ``integrate`` noticed about a run and warns of.
+    """A finding about a run, of which ``integrate`` warns.
 
     Attributes:
         category: the class of the warning, such as ``stepwell.DivergenceWarning``.
@@ -37,7 +37,7 @@ def at_places(category: type[Warning], message: str, places: Whole, shape: Shape
 
 
 def is_heard(category: type[Warning]) -> bool:
-    """Whether a warning of this class may be shown; if not, a search that takes a while can be left out."""
+    """True if a warning of this class may be shown; if not, a search that takes a while can be left out."""
     for action, message, ignored, module, _ in warnings.filters:
         if message is None and module is None and issubclass(category, ignored):
             return action != "ignore"
@@ -51,7 +51,7 @@ def warn_of(findings: Iterable[Finding], stacklevel: int = 2) -> None:
 
 
 def may_have_amounts(system: System) -> bool:
-    """Whether the numbers of a system may be amounts: its own equations of first order, whose rates do not change by themselves.
+    """True if the numbers of a system may be amounts: its own equations of first order, whose rates do not change by themselves.
 
     What algebraic equations give is no rate, and rates at one time say nothing of those at another.
     """

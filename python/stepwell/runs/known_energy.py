@@ -58,7 +58,7 @@ ROUNDING = 2.0**-40
 
 
 def keeps_energy(system: System, force: Array | None) -> bool:
-    """Whether the true motion keeps its energy: no damping, drag, friction, floors, inputs, torques or force."""
+    """True if the true motion keeps its energy: no damping, drag, friction, floors, inputs, torques or force."""
     system = system.uncontrolled
     if force is not None or getattr(system, "torques_act", False):
         return False
@@ -73,13 +73,13 @@ def keeps_energy(system: System, force: Array | None) -> bool:
 
 
 def may_pass_barriers(system: System, method: Method, steps: int) -> bool:
-    """Whether a run of fixed steps may pass a barrier, and is long enough to look for that; most systems have none."""
+    """True if a run of fixed steps may pass a barrier, and is long enough to look for that; most systems have none."""
     has_barriers = isinstance(system, Pendulum) or system.kernel == KERNEL_OF_EQUATIONS
     return method.limit != 0.0 and has_barriers and method.evaluations * steps >= FEW_EVALUATIONS
 
 
 def may_gain(system: System, method: Method, steps: int) -> bool:
-    """Whether a run of fixed steps is one of a net, to whose energy nothing but an error adds, long enough to check that."""
+    """True if a run of fixed steps is one of a net, to whose energy nothing but an error adds, long enough to check that."""
     return isinstance(system, Springs) and system.keeper is None and method.evaluations * steps >= FEW_EVALUATIONS
 
 
@@ -135,7 +135,7 @@ def judged_by_change(system: System, force: Array | None) -> list[str] | None:
 
 
 def doubt_of(run: Run, start: State, visited: Visited | None, heard: Callable[[type[Warning]], bool]) -> About | None:
-    """What shows that members did not follow the motion, and which members; None if nothing does.
+    """The evidence that members did not follow the motion, and which members; None without any.
 
     With steps of fixed length the method itself makes the energy grow or decay. There only a passed barrier counts, with a method
     that keeps swings bounded, and what algebraic equations keep.
@@ -167,13 +167,13 @@ def doubt_of(run: Run, start: State, visited: Visited | None, heard: Callable[[t
 
 
 def _has_barriers(system: System) -> bool:
-    """Whether it moves along a line or a circle, where it may not pass what takes more energy than it has."""
+    """True if it moves along a line or a circle, where it may not pass what takes more energy than it has."""
     is_line = system.kernel == KERNEL_OF_EQUATIONS and system.v_shape == () and system.y_shape == ()
     return isinstance(system, Pendulum) or is_line
 
 
 def _is_constant(run: Run, name: str, start: State) -> bool:
-    """Whether an invariant is one: along the rates at the end its changes by v and by y cancel, or those by each y without v."""
+    """True if an invariant is one: along the rates at the end its changes by v and by y cancel, or those by each y without v."""
     system, (v, y), members = run.system, _end(run), run.status.shape
     if system.mass_matrix is not None:
         return _is_constant_at_first(run, name, start)
@@ -195,7 +195,7 @@ def _is_constant(run: Run, name: str, start: State) -> bool:
 
 
 def _cancels(system: System, name: str, y: Array, rates: Array) -> bool:
-    """Whether the changes of an invariant by each number of y, along these rates, cancel."""
+    """True if the changes of an invariant by each number of y, along these rates, cancel."""
     own = tuple(range(len(system.y_shape)))
     changes = _slopes(system, name, (np.empty((0, *y.shape[len(own) :])), y))[1] * rates
     whole = changes.sum(axis=own)
@@ -203,7 +203,7 @@ def _cancels(system: System, name: str, y: Array, rates: Array) -> bool:
 
 
 def _is_constant_at_first(run: Run, name: str, start: State) -> bool:
-    """The same for algebraic equations, on a short way from the start, since it may hold only where a constraint does.
+    """``_is_constant`` for algebraic equations, on a short way from the start, since it may hold only where a constraint does.
 
     That the length of a rod has no acceleration keeps it only if it has no velocity either, as at the start. At rest nothing
     changes, so the way is as long as the state takes to change by its size, in ``STEPS`` steps by RK4.
@@ -221,7 +221,7 @@ def _is_constant_at_first(run: Run, name: str, start: State) -> bool:
 
 
 def _of_one(run: Run, name: str, start: State, evaluations: int, visited: Visited | None) -> About | None:
-    """What one invariant shows. States are evaluated together, since a call takes longer than a thousand numbers."""
+    """The evidence of one invariant. States are evaluated together, since a call takes longer than a thousand numbers."""
     system = run.system
     # Of few members it takes some tenths of a millisecond; else a place takes as long as some hundred evaluations of the core.
     few = run.status.size * PLACES <= MOST_NUMBERS // 10
@@ -385,7 +385,7 @@ def _slopes(system: System, name: str, state: State) -> State:
 
 
 def _of_terms(system: System, name: str, state: State, slopes: State) -> tuple[Array, Array]:
-    """What the terms of an invariant are made of, and the length of its slope times that of the state; both block by block.
+    """The factors of the terms of an invariant, and the length of its slope times that of the state; both block by block.
 
     The first is what the length of a block, straight down or up, makes of it, or the second where that is less.
 

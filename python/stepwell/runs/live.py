@@ -36,7 +36,7 @@ class Live(NamedTuple):
     most: float
 
     def differs(self) -> bool:
-        """Whether something else was written than the system has."""
+        """True if something else was written than the system has."""
         return self.array.tobytes() != self.known.tobytes()
 
 
@@ -53,7 +53,7 @@ class Parameters(Mapping[str, Array]):
         return array
 
     def __setitem__(self, name: str, value: Any) -> None:
-        """The same as ``world.set``."""
+        """Set parameters, as ``world.set`` does."""
         self._world.set(**{name: value})
 
     def __iter__(self) -> Iterator[str]:

@@ -45,7 +45,7 @@ class Occurrences(ValueEquality):
     y: Array
 
     def of(self, index: int | tuple[int, ...] = ()) -> Occurrences:
-        """Those of one member.
+        """The occurrences of one member.
 
         Args:
             index: of the member in the batch, a whole number or, for several batch axes, a tuple of them.

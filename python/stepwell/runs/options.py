@@ -120,7 +120,7 @@ def machine_of(device: Any, backend: str) -> Any:
 
 
 def arithmetic(fused: Any, dtype: Any) -> tuple[bool, bool]:
-    """Whether steps have fused multiply-adds, and whether they are in float32."""
+    """True if steps have fused multiply-adds, and whether they are in float32."""
     return fused is not None and checks.flag("fused", fused), dtype is not None and checks.is_single(dtype)
 
 
@@ -161,7 +161,7 @@ def check_matrix_form(system: System, method: Method, form: str, force: Any) -> 
 
 
 def _is_smooth(given: Any) -> bool:
-    """Whether an input changes within a step, so that it has a derivative there."""
+    """True if an input changes within a step, so that it has a derivative there."""
     return isinstance(given, Sinusoid) or (isinstance(given, Sampled) and given.interpolation != "hold" and not given.constant)
 
 

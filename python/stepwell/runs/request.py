@@ -66,7 +66,7 @@ MOST_STEPS = 1_000_000
 
 
 class StepControl(NamedTuple):
-    """What a request with adaptive steps has besides its plan.
+    """The part of a request with adaptive steps besides its plan.
 
     Attributes:
         pacing: the times at which states are saved, and the most steps, as the engine takes them.
@@ -531,6 +531,6 @@ class Request(NamedTuple):
 
 
 def _memory(system: System, batch: Shape, before: Continuation | None) -> Array:
-    """What the sampled controller of a system remembers at the start of a run."""
+    """The memory of the sampled controller of a system at the start of a run."""
     known = None if before is None else before.remembered(system, batch)
     return system.controller.at_start(system, batch) if known is None else known

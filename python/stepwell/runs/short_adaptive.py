@@ -83,7 +83,7 @@ class ShortAdaptiveRun(ShortRun):
 
 
 def short_adaptive_run(own: System, request: Request, shapes: tuple[Shape, Shape]) -> ShortAdaptiveRun | None:
-    """What the run is without its start; None if it cannot be prepared."""
+    """The run without its start; None if it cannot be prepared."""
     plan, control, system = request.plan, request.step_control, request.system
     assert control is not None
     if control.every is not None or control.t0.ndim or control.times.ndim > 1 or plan.single:

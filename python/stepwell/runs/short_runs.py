@@ -184,7 +184,7 @@ class ShortFixedRun(ShortRun):
 
 
 def is_free(request: Request) -> bool:
-    """Whether nothing of a request depends on the start but the start, so that it holds for others of the same shapes."""
+    """True if nothing of a request depends on the start but the start, so that it holds for others of the same shapes."""
     plan, system = request.plan, request.system
     has_target = system.control is not None or system.keeper is not None or system.mass_matrix is not None
     goes_on = request.before is not None or request.carried
@@ -192,7 +192,7 @@ def is_free(request: Request) -> bool:
 
 
 def is_small(request: Request) -> bool:
-    """Whether its start and what it saves, which are kept with it, take little memory."""
+    """True if its start and what it saves, which are kept with it, take little memory."""
     return 8 * (1 + request.plan.save_count) * (request.v.size + request.y.size) <= MOST_BYTES
 
 
@@ -207,7 +207,7 @@ def short_run_of(system: System, method: str | Method, options: Options) -> Shor
 
 
 def short_run_of_request(system: System, request: Request, shapes: tuple[Shape, Shape]) -> ShortRun | None:
-    """What the run is without its start; None if that is not known to be short."""
+    """The run without its start; None if it is not known to be short."""
     plan = request.plan
     asks_for_more = plan.record or request.record or request.events is not None or request.progress
     is_other = plan.form != "direct" or plan.backend != "rust" or plan.device is not None

@@ -129,7 +129,7 @@ def _of_rates_there(run: Run, index: Shape) -> str:
 
 
 def _where(run: Run, index: Shape) -> str:
-    """Whether a member stopped at its start, in words."""
+    """True if a member stopped at its start, in words."""
     assert run.paces is not None
     return "at the start" if float(run.paces.t[index]) == start_of(run, index) else "there"
 

@@ -46,7 +46,7 @@ def tolerances_of(tolerance: Any, system: System, acceptance: Acceptance, batch:
 
 
 def _is_of_components(part: Array, system: System, batch: Shape) -> bool:
-    """Whether a tolerance is one for each component of y, shape (*block, …), and not one for each member."""
+    """True if a tolerance is one for each component of y, shape (*block, …), and not one for each member."""
     axes = len(system.y_shape)
     fits = bool(axes) and part.ndim >= axes and part.shape[:axes] == system.y_shape
     if fits and not system.groups and part.ndim <= len(batch):

@@ -482,7 +482,7 @@ class World:
         return shortened(f"<world of {self._system!r} by {self.method.name}: {where}>", MAX_LINE)
 
     def _repr_html_(self) -> str:
-        """What is stepped and how far it is, as a table for notebooks."""
+        """A table for notebooks: system, method, time and step."""
         pairs = [
             ("system", repr(self._system)),
             ("method", self.method.title),
@@ -513,7 +513,7 @@ class World:
 
     @property
     def force(self) -> Array | None:
-        """What is added to v̇, the array that was given, or None."""
+        """The array that is added to v̇, or None."""
         return self._plan.force
 
     @property

@@ -27,7 +27,7 @@ SCALES = get_args(Scale)
 
 
 class Known:
-    """What follows from the functions of a definition, as long as they compute the same.
+    """Results that follow from the functions of a definition, as long as they compute the same.
 
     Attributes:
         readings: what the functions read.
@@ -38,7 +38,7 @@ class Known:
         self.readings, self.by_shapes = readings, {}  # type: list[Reading], dict[Any, Any]
 
     def holds(self, number: int) -> bool:
-        """Whether these are the functions, so many, and they read the same objects."""
+        """True if these are the functions, so many, and they read the same objects."""
         return len(self.readings) == number and all(map(Reading.holds, self.readings))
 
 
@@ -81,7 +81,7 @@ class Definition:
         self._known = Known([])
 
     def known(self) -> Known | None:
-        """What is known of its functions, the same object as long as these compute the same; None if that cannot be seen."""
+        """The cache of its functions, the same object as long as these compute the same; None if that cannot be seen."""
         known = self._known
         if known.holds(1 + len(self.invariants)):
             return known
@@ -97,7 +97,7 @@ class Definition:
 
     @property
     def has_v(self) -> bool:
-        """Whether the function takes v."""
+        """True if the function takes v."""
         return self.order == 2 or self.blocks == 2
 
     def __call__(self, /, **values: Any) -> Any:
@@ -207,7 +207,7 @@ class Definition:
 
 
 def _changes(value: Any) -> bool:
-    """Whether a parameter changes with the time: an input or a function."""
+    """True if a parameter changes with the time: an input or a function."""
     return isinstance(value, (Sinusoid, Sampled)) or callable(value)
 
 
@@ -383,7 +383,7 @@ def _shape(shape: Any) -> tuple[int | None, ...]:
 
 
 def fits(shape: Shape, declared: tuple[int | None, ...] | None) -> bool:
-    """Whether a shape is as declared."""
+    """True if a shape is as declared."""
     return declared is None or (
         len(shape) == len(declared) and all(want in (None, got) for got, want in zip(shape, declared, strict=True))
     )

@@ -31,7 +31,7 @@ class Unknown(Exception):  # noqa: N818 (not an error: the function is traced)
 
 
 class Reading:
-    """What a function reads, and its identity, which holds as long as it reads the very same objects.
+    """The objects that a function reads, and its identity, which holds as long as they are the very same.
 
     That is seen in a microsecond; to find the identity anew takes some tens of them.
     """
@@ -48,7 +48,7 @@ class Reading:
         self.is_fixed = True
 
     def holds(self) -> bool:
-        """Whether the function still reads the same objects, none of which can be changed in place."""
+        """True if the function still reads the same objects, none of which can be changed in place."""
         if not self.is_fixed:
             return False
         for names, name, value in self.names:
@@ -82,7 +82,7 @@ def identity(function: Any) -> Any:
 
 
 def reading(function: Any) -> Reading:
-    """What a function reads, with its identity.
+    """The objects that a function reads, with its identity.
 
     Raises:
         Unknown: if something that the function reads may change unseen.
@@ -178,5 +178,5 @@ def _of_function(function: FunctionType, reading: Reading) -> Any:
 
 
 def _is_pure(value: Any) -> bool:
-    """Whether a built-in of Python reads nothing but its arguments, as classes of errors do."""
+    """True if a built-in of Python reads nothing but its arguments, as classes of errors do."""
     return value in PURE or (isinstance(value, type) and issubclass(value, BaseException))

@@ -265,7 +265,7 @@ class OwnSystem(System):
         return ""
 
     def _fits(self, shapes: dict[str, Shape]) -> bool:
-        """Whether states of these shapes can begin with blocks of the known shapes."""
+        """True if states of these shapes can begin with blocks of the known shapes."""
         mine = {"v": self.v_shape, "y": self.y_shape}
         return all(shape == () or shape[: len(mine[name])] == mine[name] for name, shape in shapes.items())
 
@@ -459,7 +459,7 @@ class OwnSystem(System):
 
     @property
     def chooses(self) -> bool:
-        """Whether the rates are made of pieces between which the state or the time chooses.
+        """True if the rates are made of pieces between which the state or the time chooses.
 
         The choice of a control to do nothing where the gradient is zero does not count: there is no gradient to go along.
         """
@@ -469,12 +469,12 @@ class OwnSystem(System):
 
     @property
     def reads_time(self) -> bool:
-        """Whether the function depends on the time."""
+        """True if the function depends on the time."""
         return bool(self._retraced()._core.reads_time)
 
     @property
     def switches_by_time(self) -> bool:
-        """Whether comparisons and the like of the time choose between pieces of the function."""
+        """True if comparisons and the like of the time choose between pieces of the function."""
         bound = self._retraced()
         assert bound.equations is not None
         return bound.reads_time and bound.equations.switching(bound._of_function())[0].by_time

@@ -57,7 +57,7 @@ class Tolerances(NamedTuple):
     of_groups: bool = False
 
     def of_steps(self, method: Method) -> Tolerances:
-        """Those of its steps, in proportion to which the errors of runs are: SECOND_ORDER and less for a method of that order."""
+        """The tolerances of single steps, in proportion to which errors of runs are: SECOND_ORDER and less for that order."""
         if method.order != 2:
             return self
         share = np.sqrt(np.clip(self.relative / SECOND_ORDER, LEAST_SHARE**2, 1.0))
@@ -127,7 +127,7 @@ def pacing_of_core(plan: Plan, pacing: Pacing) -> CorePacing:
 
 
 def looks_within(plan: Plan, pacing: Pacing) -> bool:
-    """Whether states are those of the continuous extension of the method, if they are within a step."""
+    """True if states are those of the continuous extension of the method, if they are within a step."""
     return (len(pacing.at) > 1 or pacing.is_part) and extends(plan)
 
 
@@ -375,7 +375,7 @@ def attempt_by_numpy(plan: Plan, budget: int) -> Any:
 
 
 def extends(plan: Plan) -> bool:
-    """Whether states within a step are those of the continuous extension of the method.
+    """True if states within a step are those of the continuous extension of the method.
 
     Else each takes a step of its own: where it owes more than the extension knows of, as a projection and amounts that do not
     become negative do; and in float32, where the roundings of stages, times weights of some hundreds, are as large as tolerances.

@@ -160,7 +160,7 @@ def looped(
 
 
 def to_slot(plan: Plan, v: Array, y: Array) -> Array:
-    """What the method carries at the first step; v and what it keeps, as rows, if it does."""
+    """The carry of the method at the first step; if it keeps blocks, v and these as rows."""
     if not plan.method.begins:
         return v
     t = plan.t0 + plan.first * plan.dt

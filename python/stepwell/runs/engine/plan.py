@@ -32,7 +32,7 @@ class Watched(NamedTuple):
 
 
 class Plan(NamedTuple):
-    """What to run. ``choice`` is the number of the method's start; ``force`` is added to v̇; ``threads`` 0 chooses their number.
+    """A run to make. ``choice`` is the number of the method's start; ``force`` is added to v̇; ``threads`` 0 chooses their number.
 
     ``t0`` is the time of step 0, or that of each member, shape (*batch), which the core takes as a parameter: see ``of_core``.
     ``single`` is whether steps are computed in float32. With adaptive steps ``order`` is that of a series, ``acceptance`` what a
@@ -109,7 +109,7 @@ class Plan(NamedTuple):
 
     @property
     def fuses(self) -> bool:
-        """Whether products are fused on the tape of a step, which shows which these are, beside those that the rates fuse."""
+        """True if products are fused on the tape of a step, which shows which these are, beside those that the rates fuse."""
         return self.fused and (self._of_fused is None or self.system.fuses_on_tape)
 
     @property
@@ -120,7 +120,7 @@ class Plan(NamedTuple):
 
     @property
     def by_tape(self) -> bool:
-        """Whether the NumPy backend evaluates the tape of the reference: for steps that are fused there, float32 and series."""
+        """True if the NumPy backend evaluates the tape of the reference: for steps that are fused there, float32 and series."""
         return self.fuses or self.single or self.method.has_derivatives
 
     @property
@@ -132,12 +132,12 @@ class Plan(NamedTuple):
 
     @property
     def keeps(self) -> bool:
-        """Whether more than the slot of v is kept beside y: blocks of the method, or what a sampled controller remembers."""
+        """True if more than the slot of v is kept beside y: blocks of the method, or what a sampled controller remembers."""
         return bool(self.method.kept) or self.system.controller is not None
 
     @property
     def begins(self) -> bool:
-        """Whether a run begins with more than its state."""
+        """True if a run begins with more than its state."""
         return self.method.begins or self.keeps
 
     @property

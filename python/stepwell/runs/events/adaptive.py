@@ -128,11 +128,11 @@ class _Driver(Collected):
         return self.stepped(self.plan, self.pacing, everyone, paces, v, y)
 
     def sought(self) -> by_core.Sought | None:
-        """What the core is to look for; None where it cannot."""
+        """The events as the core takes them; None where it cannot look for them."""
         return by_core.sought(self)
 
     def goes_in_lanes(self) -> bool:
-        """Whether the core may make this run with its events."""
+        """True if the core may make this run with its events."""
         return True
 
     def made(self, sought: by_core.Sought, paces: Array, v: Array, y: Array) -> engine.Adapted | None:

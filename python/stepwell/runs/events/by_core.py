@@ -87,7 +87,7 @@ class Sought(NamedTuple):
 
 
 def sought(search: Collected, new_states: dict[int, NewState] | None = None, jumps: Array | None = None) -> Sought | None:
-    """What the core is to look for; None where a part of it is no tape for numbers of 64 bits, as of many bodies.
+    """The events as the core takes them; None where a part is no tape for numbers of 64 bits, as of many bodies.
 
     ``new_states`` are those that events give members, by the numbers of these; ``jumps`` are those of adaptive steps.
     """

@@ -253,7 +253,7 @@ class Collected:
         return Stops(stops, last, at, side, due, size)
 
     def end_at(self, at: Located, due: Any) -> None:
-        """What occurs where members end: all that is due, since nothing changes their states."""
+        """The occurrences where members end: all that are due, since nothing changes their states."""
         for e, each in enumerate(due):
             self.note(e, at.some(each))
 

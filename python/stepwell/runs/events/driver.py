@@ -106,7 +106,7 @@ class _Driver(Collected):
         return self._outcome()
 
     def _sought(self) -> by_core.Sought | None:
-        """What the core looks for; None where it does not."""
+        """The events as the core takes them; None where it cannot look for them."""
         return by_core.sought(self)
 
     def _by_core(self, sought: by_core.Sought, v: Array, y: Array, bad: Whole, carried: bool) -> engine.Outcome:
@@ -125,7 +125,7 @@ class _Driver(Collected):
         """Begin at these states."""
 
     def _rest(self, size: int) -> None:
-        """What is left to do of some members."""
+        """Go on with members that were put off."""
 
     def _group(self, index: Whole, at: At, most: int, done: int = 0) -> None:
         """All further steps of some members; those that stop leave the group."""

@@ -1,4 +1,4 @@
-"""What users give as ``events=``."""
+"""The argument ``events=``."""
 
 from __future__ import annotations
 

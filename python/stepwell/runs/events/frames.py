@@ -103,7 +103,7 @@ class Frames(Collected):
         return not all(np.isfinite(each).all() for each in self._blocks)
 
     def _looked_for(self) -> by_core.Sought | None:
-        """What the core looks for; None if it cannot, which stays so."""
+        """The events as the core takes them; None if it cannot look for them, which stays so."""
         force = self.plan.force
         if force is not None and not np.array_equal(force, np.nan if self._force is None else self._force, equal_nan=True):
             self._with_force()

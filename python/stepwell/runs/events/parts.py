@@ -1,4 +1,4 @@
-"""What the parts of an event search exchange: states of members, changes of sign, occurrences."""
+"""Values that the parts of an event search exchange: states of members, changes of sign, occurrences."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ ROUNDINGS = 2.0
 
 
 def is_no_time(t: Array, other: Array) -> Any:
-    """Whether there are only roundings of times between these."""
+    """True if only roundings of times lie between these."""
     return np.abs(other - t) <= ROUNDINGS * np.spacing(np.maximum(np.abs(t), np.abs(other)))
 
 

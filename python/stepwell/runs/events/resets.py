@@ -71,7 +71,7 @@ class Stretch(NamedTuple):
 
 
 class After(NamedTuple):
-    """What members are after an instant at which events occurred.
+    """Members after an instant at which events occurred.
 
     Attributes:
         v: velocities, shape (*block, n).
@@ -91,7 +91,7 @@ class After(NamedTuple):
 
 
 class Ahead(NamedTuple):
-    """What ends some stretches: the share of each, infinite if nothing does, the time, and what members are after it.
+    """The ends of some stretches: the share of each, infinite if nothing ends it, the time, and members after it.
 
     ``g_end`` is each quantity where a stretch ends without that.
     """
@@ -174,7 +174,7 @@ class Resets:
             self.circles[:, member] = circle
 
     def changes(self, e: int) -> bool:
-        """Whether an event changes the state."""
+        """True if an event changes the state."""
         return e in self.new_states
 
     def within(self, e: int, steps: Changes) -> tuple[Changes, Whole]:
@@ -183,7 +183,7 @@ class Resets:
         return self.from_side(e, steps, np.where(lies, self.at[e, steps.member], 0.0), lies)
 
     def from_side(self, e: int, steps: Changes, side: Array, lies: Any) -> tuple[Changes, Whole]:
-        """The same from the sides from which members came that are at the event, 0 for others, and which of these lie there."""
+        """The changes from the sides from which members at the event came, 0 for others, and which of these lie there."""
         if not side.any():
             return self._run.within(e, steps)[0], np.zeros(0, dtype=np.int64)
         changes, stuck = self._run.within(e, steps, side)
@@ -234,7 +234,7 @@ class Resets:
         return share
 
     def happen(self, at: Located, h: Array, side: Array, due: Any, size: Array, lies: Array) -> After:
-        """What occurs at an instant of some members: events that are due, in the order of the list, and those that they set off.
+        """Make events occur at an instant of some members: those due, in the order of the list, and those that they set off.
 
         A change of the state sets off each event whose quantity it takes across zero or to zero, in the event's direction. An
         event that changed the state and at which the new state still is begins without a side: it is not set off.
@@ -302,7 +302,7 @@ class Resets:
         self._run.note(e, entries.some(entries.share > AT_START))
 
     def _leads_back(self, e: int, t: Array, h: Array, old: State, new: State, member: Whole, side: Array) -> Any:
-        """Whether an event holds members where they are, such as the event of an empty tank that sets a level below zero to zero.
+        """True if an event holds members where they are, such as the event of an empty tank that sets a level below zero to zero.
 
         It holds them if it changes their states by roundings only, the motion leads across it, and its change of the state after
         that leads them back by at least half of the way. A kick of zero also leaves a state as it is, but leads nothing back.
@@ -322,7 +322,7 @@ class Resets:
             return holds & (across > 0.0) & (side * (g_back - g_further) >= 0.5 * across)
 
     def bounces(self, e: int, t: Array, h: Array, state: State, member: Whole, side: Array) -> Any:
-        """Whether an event turns members back, or holds them, that begin at it, at rest, and are pushed across it.
+        """True if an event turns members back, or holds them, that begin at it, at rest, and are pushed across it.
 
         A little later its change of the state must not lead to the other side, as a damping does, of v to 0.9 v.
         """

@@ -89,7 +89,7 @@ class Timed:
         return self._keys, self._signs
 
     def covers(self, begin: float, end: float) -> bool:
-        """Whether all times between these are known."""
+        """True if all times between these are known."""
         return self._until[0] <= min(begin, end) and max(begin, end) <= self._until[1]
 
     def _place(self, member: Whole, key: Array) -> tuple[Whole, Whole]:

@@ -97,7 +97,7 @@ class Trials:
         return self._model.tables if self.has_samples else []
 
     def _single_of_core(self, what: str) -> tuple[Evaluated, list[Array]] | None:
-        """The same of float32, whose rates are those of float64; not of a method that carries or keeps something."""
+        """The trials of float32, whose rates are those of float64; not of a method that carries or keeps something."""
         plan, control = self._everyone, self._plan.system.control
         if self._adaptive or plan.method.begins or control is not None or self._number is None:
             return None
