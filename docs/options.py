@@ -143,7 +143,6 @@ OPTIONS: dict[str, Callable[[Kind, Request], None]] = {
     "leapfrog": _with(method="leapfrog"),
     "taylor": _with(method="taylor"),
     "matrix": _with(form="matrix"),
-    "power": _with(form="power"),
     "force": _with(force=0.1),
     "control": lambda kind, request: request.update(control=kind.control),
     "projection": lambda kind, request: request.update(control=kind.projection),

@@ -704,7 +704,6 @@ if __name__ == "__main__":
     write("figures.png", sw.charts.figures().plot())
     plant = sw.TransferFunction(1.0, [1.0, 0.2, 1.0])
     write("bode.png", sw.charts.bode(plant, dt=0.5).plot())
-    write("powers.png", sw.charts.powers().plot())
     write("verlet-friction.png", sw.charts.verlet_friction().plot())
     eight = sw.scenes.figure_eight()
     assert eight.period is not None

@@ -34,7 +34,6 @@ registry.register(
     draw_map="stepwell.views.charts.map_picture:draw",
     draw_norm="stepwell.views.charts.norm_picture:draw",
     draw_panel="stepwell.views.charts.panel_picture:draw",
-    draw_powers="stepwell.views.charts.powers_picture:draw",
     draw_run="stepwell.views.charts.runs_picture:draw",
     draw_verlet_friction="stepwell.views.charts.verlet_friction_picture:draw",
     draw_work_precision="stepwell.views.charts.picture:draw",

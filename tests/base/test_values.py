@@ -151,7 +151,6 @@ MAKERS: dict[str, list[Callable[[], Any]]] = {
     "StabilityMap": each(charts.stability_map, "rk4", "merson"),
     "NormSweep": each(partial(charts.norm, ["rk4"]), {"gains": [0.1]}, {"gains": [0.2]}),
     "Settled": each(lambda gain: charts.norm(["rk4"], gains=[gain]).lines[0], 0.1, 0.2),
-    "Powers": [lambda: charts.powers("rk4")],  # with measured times
     "VerletFriction": each(charts.verlet_friction, {}, 0.05),
     "Solved": each(lambda length: charts.Solved(np.ones(2), np.ones(length), None, 0.1), 2, 3),
 }

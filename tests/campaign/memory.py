@@ -97,7 +97,6 @@ KINDS: dict[str, tuple[Callable[[int], Any], float]] = {
     "1000 members, two threads": (lambda _: sw.integrate(MANY, "rk4", v=0.0, y=1.0, dt=0.1, steps=300, threads=2), 0.2),
     "large results": (lambda _: sw.integrate(MANY, "false_euler", v=0.0, y=1.0, dt=0.1, steps=200, every=2), 0.05),
     "by the matrix": (lambda _: sw.integrate(**FREE, steps=3, form="matrix"), 0.3),
-    "by powers": (lambda _: sw.integrate(**FREE, steps=300, form="power"), 0.1),
     "fused, recorded, forced": (lambda _: sw.integrate(**FREE, steps=3, fused=True, record="energy", force=0.1), 1.0),
     "adaptive": (lambda _: sw.integrate(PENDULUM, "dop853", v=0.0, y=1.0, tolerance=1e-6, at=[1.0, 2.0]), 1.0),
     "a series": (lambda _: sw.integrate(PENDULUM, "taylor", v=0.0, y=1.0, tolerance=1e-9, at=[1.0, 2.0]), 0.3),

@@ -329,7 +329,6 @@ def test_what_does_not_go_with_a_force() -> None:
         (lambda: sw.integrate(lorenz, "rk4", y=y, **step), no_v),
         (lambda: sw.integrate(rates, "rk4", v=0.0, y=np.ones(2), **step), no_v),
         (lambda: sw.integrate(sw.Oscillator(), "rk4", v=0.0, y=1.0, **step, form="matrix"), "works with form='direct' only"),
-        (lambda: sw.integrate(sw.Oscillator(), "rk4", v=0.0, y=1.0, **step, form="power"), "works with form='direct' only"),
         kind=UnsupportedError,
     )
 

@@ -8,12 +8,14 @@ from typing import Any
 import numpy as np
 import pytest
 import stepwell as sw
-from stepwell.errors import ArgumentError, UnsupportedError
+from stepwell.errors import ArgumentError, UnknownNameError, UnsupportedError
 from support.calls import assert_raises
+from support.cases import Case, cases
 from support.for_each import for_each
 
 EPS = np.finfo(float).eps
 METHODS = [m.name for m in sw.methods()]
+MATRIX = [case for case in cases() if case.form == "matrix"]
 RUN: dict[str, Any] = {"dt": 0.05, "steps": 200, "every": 10}
 
 
@@ -280,3 +282,34 @@ def test_one_input_in_each_of_its_spellings() -> None:
         np.testing.assert_allclose([run.v[0, 0], run.y[0, 0]], 0.5 * b * (1 - np.exp(-5.0)), rtol=1e-6)
     members = sw.integrate(sw.LinearSystem(A, b, x=np.array([0.5, 1.0, 2.0])), "rk4", v=0.0, y=0.0, dt=0.1, steps=50)
     assert members.y.shape == (1, 1, 3)
+
+
+@for_each("case", MATRIX)
+def test_direct_and_matrix_agree(case: Case) -> None:
+    n = 200
+    # Small steps, so that no method grows by more than 10 in 200 of them and errors are not amplified by more.
+    matrix = case.run(20, steps=n, every=10, dt=0.05)
+    direct = Case(case.method, case.system, "direct", case.start).run(20, steps=n, every=10, dt=0.05)
+    same = np.array_equal(matrix.v, direct.v) and np.array_equal(matrix.y, direct.y)
+    assert not same or case.method in ("standard_euler", "false_euler")
+    size = max(np.abs(direct.y).max(initial=0.0), np.abs(direct.v).max(initial=0.0))
+    # Each step of either form rounds some dozens of times (rows of P and the stages alike) relative to the largest number; n
+    # steps add up n of those, times the growth. Verlet's recursion has a double root near 1: n²/2 of them, and its v divides by
+    # h·ω₀ ≥ 0.025.
+    steps = n * n / 2 / 0.025 if case.method == "verlet" else n
+    bound = 40 * steps * EPS * 10 * size
+    np.testing.assert_allclose(matrix.y, direct.y, rtol=0, atol=bound)
+    np.testing.assert_allclose(matrix.v, direct.v, rtol=0, atol=bound)
+
+
+def test_many_steps_at_once_are_a_power_of_the_matrix() -> None:
+    """What the error says is to be written in place of the form that there was."""
+    system, dt, n = sw.Oscillator(), 0.1, 1000
+    with pytest.raises(UnknownNameError, match="form: there is no 'power' any more") as raised:
+        sw.integrate(system, "rk4", v=0.3, y=1.0, dt=dt, steps=n, form="power")  # type: ignore[arg-type]
+    for method in ("false_euler", "rk4", "exact"):
+        run, state = sw.integrate(system, method, v=0.3, y=1.0, dt=dt, steps=n), np.array([0.3, 1.0])
+        places = {"np": np, "sw": sw, "system": system, "method": method, "dt": dt, "n": n, "state": state}
+        power, matrix = str(raised.value).split("steps are ")[1].split(", with P = ")
+        places["P"] = eval(matrix, places)
+        np.testing.assert_allclose(eval(power, places), [run.v[-1], run.y[-1]], rtol=0.0, atol=1e-12)

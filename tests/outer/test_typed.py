@@ -10,7 +10,7 @@ import pytest
 from stepwell.base import literals
 from stepwell.model import controls, surfaces
 from stepwell.model.systems import aircraft, nbody, oscillator
-from stepwell.runs import request
+from stepwell.runs import options
 from stepwell.source import exports
 from stepwell.studies.advice import COSTS
 
@@ -73,8 +73,8 @@ def test_mypy_finds_what_is_written_wrongly(tmp_path: Path) -> None:
 
 def test_the_types_have_the_words_that_are_checked() -> None:
     for words, known in (
-        (literals.RunForm, request.FORMS),
-        (literals.Backend, request.BACKENDS),
+        (literals.StepForm, options.FORMS),
+        (literals.Backend, options.BACKENDS),
         (literals.OscillatorForm, oscillator.FORMS),
         (literals.AttitudeForm, aircraft.FORMS),
         (literals.BodyForce, nbody.FORCES),

@@ -28,9 +28,8 @@ def sampled(salt: str, **several: int) -> Any:
 
 
 def ways_of(case: Case) -> list[str]:
-    """A world has steps one by one, and the bits of a power depend on how many steps it makes at once."""
-    without = {"matrix": {"in a world"}, "power": {"in a world", "in pieces", "from a pickle", "from a file", "saved more often"}}
-    return [way for way in WAYS if way not in without.get(case.form, ())]
+    """A world has the direct form only."""
+    return [way for way in WAYS if way != "in a world" or case.form == "direct"]
 
 
 @pytest.mark.long
@@ -38,7 +37,7 @@ def ways_of(case: Case) -> list[str]:
 def test_every_case_in_every_way(case: Case) -> None:
     """What test_ways.py samples, for all methods, systems, forms and starts, in both precisions."""
     for b, options in ((5, {}), (33, {}), (5, {"dtype": "float32", "fused": number(case) % 2 == 1})):
-        if "dtype" in options and (case.form == "power" or case.refused_in_float32()):
+        if "dtype" in options and case.refused_in_float32():
             continue
         system, arguments = case.make(b)
         assert_equal_ways(system, ways=ways_of(case), **{"steps": 23, "every": 5, "t0": 0.3} | arguments | options)

@@ -204,7 +204,6 @@ def test_what_is_asked_for_as_in_numpy() -> None:
 
 PACED: dict[str, Any] = {"dt": None, "steps": None, "method": "merson", "tolerance": 1e-3, "at": [1.0]}
 REFUSED: list[tuple[Any, dict[str, Any], str]] = [
-    (sw.Oscillator(), {"form": "power"}, "each squaring of a matrix doubles the error of the power"),
     (sw.Oscillator(), PACED | {"tolerance": 1e-7}, "tolerance: in float32 a step rounds the state by up to 2⁻²³"),
     (sw.Oscillator(), PACED | {"tolerance": (1e-9, 1e-8)}, "got 1.1e-08 of the size at the start"),
     (sw.Oscillator(), PACED | {"y": 1e39}, "y: expected numbers up to 3.4e38"),

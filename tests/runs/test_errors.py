@@ -183,12 +183,6 @@ BAD: dict[type[Exception], list[tuple[Callable[[], Any], str]]] = {
         ),
         (lambda: world(sw.Oscillator(damping=0.1), "verlet"), "verlet needs forces that do not depend on"),
         (lambda: run(sw.NBody(), y=np.ones((3, 2)), form="matrix"), "only linear systems have a transition matrix"),
-        (lambda: run(sw.NBody(), y=np.ones((3, 2)), form="power"), "only linear systems have a transition matrix"),
-        (
-            lambda: run(sw.Oscillator(x=0.5, a=sw.Sampled([1.0, 2.0], 0.1)), form="power"),
-            "form: many steps are one power only if the inputs follow a formula, as constants and sinusoids do, but a changes "
-            "from sample to sample; use form='matrix' or 'direct'",
-        ),
         (lambda: run(control=sw.EnergyControl(0.3)), "control: Oscillator(omega=1.0, form='canonical') has no energy control"),
         (
             lambda: run(sw.NBody(), "leapfrog", y=np.eye(3, 2), control=sw.Projection()),

@@ -624,7 +624,7 @@ def test_wrong_events() -> None:
     ):
         refused(error, message, sw.integrate, sw.Pendulum(), "merson", **{"v": 0.0, "y": 1.0} | steps, events=events)
     with pytest.raises(UnsupportedError, match="events: works with form='direct' only"):
-        sw.integrate(sw.Oscillator(), "rk4", v=0.0, y=1.0, dt=0.1, steps=5, form="power", events=crossing)
+        sw.integrate(sw.Oscillator(), "rk4", v=0.0, y=1.0, dt=0.1, steps=5, form="matrix", events=crossing)
 
 
 def test_wrong_events_of_worlds() -> None:

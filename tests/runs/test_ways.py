@@ -65,7 +65,7 @@ def factors() -> dict[str, tuple[str, ...]]:
     return {
         "method": tuple(methods()),
         "system": tuple(systems()),
-        "drive": ("steps", "steps back", "tolerance", "tolerance back", "matrix", "power"),
+        "drive": ("steps", "steps back", "tolerance", "tolerance back", "matrix"),
         "numbers": ("float64", "float64 fused", "float32", "float32 fused"),
         "clock": ("zero", "later", "of each member"),
         "push": ("none", "force", "control", "projection"),
@@ -92,7 +92,7 @@ def goes(row: Row) -> bool:
     method = methods().get(row.get("method", ""))
     system = system_of(row["system"]) if "system" in row else None
     drive, numbers, push = (row.get(name, "") for name in ("drive", "numbers", "push"))
-    matrix, tolerance, back, single = drive in ("matrix", "power"), "tolerance" in drive, "back" in drive, "float32" in numbers
+    matrix, tolerance, back, single = drive == "matrix", "tolerance" in drive, "back" in drive, "float32" in numbers
     events, energy, own = row.get("events", "none") != "none", row.get("record") == "energy", row.get("clock") == "of each member"
     way, every = row.get("way", ""), row.get("every")
     hard = method and (method.is_implicit or method.has_series)
@@ -102,10 +102,8 @@ def goes(row: Row) -> bool:
         (way == "in a world" and (tolerance or matrix or own or row.get("events") == "stops"))
         # Who was stopped within a step does not go on; of steps that are saved as they are made there is one time.
         or (pieces and (row.get("events") == "stops" or (tolerance and every not in (None, "none"))))
-        # A power makes the steps between two saved states at once, and its bits depend on how many these are.
-        or (drive == "power" and (way == "saved more often" or (pieces and every not in (None, "one"))))
         or (matrix and (push not in ("", "none") or events))
-        or (single and (drive == "power" or (own and not tolerance)))
+        or (single and own and not tolerance)
         or (back and push == "control")
         or (method and tolerance and method.error_order is None)
         or (method and single and (method.has_series or method.splits))
@@ -159,7 +157,7 @@ def built(row: Row) -> tuple[Any, Any, dict[str, Any]]:
         options |= {"tolerance": 1e-3, "at": at if every is None else at[-1:], "every": every, "max_steps": 2000}
     else:
         options |= {"dt": h, "steps": 11, "every": every, "start_step": 12 if row["clock"] == "later" else None}
-    if row["drive"] in ("matrix", "power"):
+    if row["drive"] == "matrix":
         options["form"] = row["drive"]
     options |= {"fused": "fused" in row["numbers"], "dtype": row["numbers"].split()[0]}
     if row["push"] == "force":

@@ -343,8 +343,6 @@ def cases(methods: Iterator[str] | None = None) -> Iterator[Case]:
             continue
         waves = any(isinstance(x, sw.Sinusoid) for x in instance.given_inputs().values())
         forms = ["direct"] + ["matrix"] * (instance.linear and not (record.takes_derivatives_by_time and waves))
-        if "matrix" in forms and all(isinstance(x, sw.Sinusoid) or x.constant for x in instance.given_inputs().values()):
-            forms.append("power")
         for form in forms:
             for start in record.starts or (None,):
                 yield Case(method, system, form, start)

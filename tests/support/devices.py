@@ -94,9 +94,7 @@ def velocity_verlet(s: Any, t: Any, h: Any, v: Any, y: Any) -> Any:
 
 
 #: Of the recorded runs those whose kernels are compiled in a second; a few of them here, all by `make test-long`.
-SHORT = [
-    name for name in recorded.written() if not any(word in name for word in ("large", "bodies", "tolerance", "power", "fused"))
-]
+SHORT = [name for name in recorded.written() if not any(word in name for word in ("large", "bodies", "tolerance", "fused"))]
 
 
 def of_recorded(name: str, monkeypatch: Any) -> None:

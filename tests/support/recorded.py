@@ -138,7 +138,7 @@ def _case(case: Case, members: int) -> tuple[sw.System, dict[str, Any]]:
 def drawn() -> list[Case]:
     """Every system and every method several times in each form, the free oscillator always, and all that was drawn before."""
     every = list(cases())
-    chosen = set(representative(every, {"direct": 5, "matrix": 3, "power": 3}))
+    chosen = set(representative(every, {"direct": 5, "matrix": 3}))
     before = written()
     return [case for case in every if case in chosen or case.system == "free" or _varied(case).name in before]
 
@@ -288,9 +288,9 @@ def diverging() -> Iterator[Recorded]:
     for i, system in enumerate((*others, "linear, two states", "sampled x, sinusoid a", "linear, seventeen states")):
         case = Case(HELD[(3 * i + 1) % len(HELD)], system, "direct", None)
         yield _fixed(f"{case.method}, {system}, dt = 60", partial(_case, case, 33), dt=60.0, steps=200, every=50)
-    for form, method in itertools.product(("matrix", "power"), ("false_euler", "verlet", "rk4")):
-        free = partial(_case, Case(method, "free", form, None), 33)
-        yield _fixed(f"{method}, free, {form}, dt = 3", free, dt=3.0, steps=2000, every=500)
+    for method in ("false_euler", "verlet", "rk4"):
+        free = partial(_case, Case(method, "free", "matrix", None), 33)
+        yield _fixed(f"{method}, free, matrix, dt = 3", free, dt=3.0, steps=2000, every=500)
 
     def meeting(kind: str) -> Any:
         y = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]])[..., np.newaxis] * np.ones(9)
@@ -322,9 +322,9 @@ def pieces() -> Iterator[Recorded]:
         for start in sw.method(method).starts or (None,):
             case = Case(method, systems[i % len(systems)], "direct", start)
             yield Recorded(f"{case}, in pieces", partial(make, case))
-    for method, form in (("verlet", "matrix"), ("rk4", "matrix"), ("merson", "power")):
-        case = Case(method, "sinusoid x", form, None)
-        yield Recorded(f"{method}, sinusoid x, {form}, in pieces", partial(make, case))
+    for method in ("verlet", "rk4"):
+        case = Case(method, "sinusoid x", "matrix", None)
+        yield Recorded(f"{method}, sinusoid x, matrix, in pieces", partial(make, case))
 
     def make_held(kind: str, method: str, backend: str) -> Arrays:
         system, state = _bodies(5, 3, "newton", 9)
@@ -436,7 +436,7 @@ def large() -> Iterator[Recorded]:
             v, y = (rng.normal(size=(*shape, *_axes(members))) for shape in (system.v_shape, system.y_shape))
             return system, {"v": v, "y": y}
 
-        for form, method in zip(("direct", "direct", "matrix", "power"), (HELD * 3)[3 * i :], strict=False):
+        for form, method in zip(("direct", "direct", "matrix"), (HELD * 3)[3 * i :], strict=False):
             name = f"{method}, linear of {n} states, {form}, {_called(members)}, large"
             yield _fixed(name, linear, method=method, dt=0.05, steps=20, every=7, form=form)
         name = f"merson, linear of {n} states, tolerance, {_called(members)}, large"
@@ -452,9 +452,9 @@ def large() -> Iterator[Recorded]:
         members = (None, 3, 33)[i % 3]
         name = f"{method}, chain of a hundred, {_called(members)}, large"
         yield _fixed(name, partial(chain, members), method=method, dt=0.1, steps=20, every=6)
-    for method, form in (("leapfrog", "matrix"), ("rk4", "power"), ("verlet", "matrix")):
-        name = f"{method}, chain of a hundred, {form}, large"
-        yield _fixed(name, partial(chain, None), method=method, dt=0.1, steps=20, form=form)
+    for method in ("leapfrog", "verlet"):
+        name = f"{method}, chain of a hundred, matrix, large"
+        yield _fixed(name, partial(chain, None), method=method, dt=0.1, steps=20, form="matrix")
     name = "fehlberg_5, chain of a hundred, tolerance, large"
     yield _fixed(name, partial(chain, 3), method="fehlberg_5", tolerance=1e-5, at=[1.0])
 

@@ -277,9 +277,9 @@ def test_stability_draws_what_was_asked_for_and_tells_what_it_refuses(capsys, tm
     drawn = [float(row["r1_squared"]) for row in read(folder / "stability.csv") if row["method"] == "rk4"]
     assert drawn == sw.charts.stability(["rk4"]).loci[0].r1_squared.tolist()
     folder = tmp_path / "asked"
-    words = ("stability", "rk4", "-o", str(folder), "--charts", "powers, loci,powers", "--phi", "2.5")
+    words = ("stability", "rk4", "-o", str(folder), "--charts", "map, loci,map", "--phi", "2.5")
     report = listed(capsys, *words)
-    names = ["powers-rk4.png", "stability-loci.png", "stability.csv"]
+    names = ["stability-loci.png", "stability-map-rk4.png", "stability.csv"]
     assert sorted(report["files"]) == sorted(str(folder / name) for name in names)
     assert sorted(path.name for path in folder.iterdir()) == names
     assert float(read(folder / "stability.csv")[-1]["phi"]) == 2.5

@@ -95,9 +95,8 @@ def test_form_and_start_are_those_of_integrate_and_wrong_settings_are_one_line(c
         assert message in said
         assert said.count("\n") == 1, setting
     scene = sw.scenes.oscillator()
-    for form in ("matrix", "power"):
-        printed = report(capsys, "oscillator", "--method", "rk4", "--form", form, "--steps", "50")
-        assert printed["last_y"] == scene.run("rk4", steps=50, every=1, form=form).y[-1]
+    printed = report(capsys, "oscillator", "--method", "rk4", "--form", "matrix", "--steps", "50")
+    assert printed["last_y"] == scene.run("rk4", steps=50, every=1, form="matrix").y[-1]
     printed = report(capsys, "oscillator", "--method", "verlet", "--start", "first_order", "--steps", "50")
     assert printed["last_y"] == scene.run("verlet", steps=50, start="first_order").y[-1]
     assert printed["last_y"] != scene.run("verlet", steps=50).y[-1]

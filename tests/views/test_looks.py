@@ -289,7 +289,6 @@ PICTURES = {
     "norm": lambda: sw.charts.norm().plot(),
     "figures": lambda: sw.charts.figures().plot(),
     "figure of one that looks exact": lambda: sw.charts.figures(["rk4"]).plot(method="rk4"),
-    "powers": lambda: sw.charts.powers(steps=[1, 10, 100]).plot(),
     "bode": lambda: sw.charts.bode(sw.Oscillator(1.0, 0.1), dt=0.5).plot(),
     "bode of samples": lambda: sw.charts.bode(CUBE, ["standard_euler", "rk4"], dt=0.3, x="hold").plot(),
     "friction": lambda: sw.charts.verlet_friction().plot(),

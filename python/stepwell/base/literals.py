@@ -4,10 +4,7 @@ from __future__ import annotations
 
 from typing import Literal
 
-#: How a run is computed: step by step, by the transition matrix, or by powers of it.
-RunForm = Literal["direct", "matrix", "power"]
-
-#: The form of a step that is explained.
+#: How the steps of a run, and a step that is explained, are computed: by the method's formulas, or by the transition matrix.
 StepForm = Literal["direct", "matrix"]
 
 #: What computes a run.

@@ -205,16 +205,6 @@ def goes_back(system: System, control: Any) -> None:
         raise UnsupportedError(f"dt: with a negative step {control!r} would drive away from its target; use a projection")
 
 
-def goes_on_by_a_rule(system: System) -> None:
-    """Raise if the power form cannot advance an input over many steps."""
-    for name, each in system.given_inputs().items():
-        if isinstance(each, Sampled) and not each.constant:
-            raise UnsupportedError(
-                f"form: many steps are one power only if the inputs follow a formula, as constants and sinusoids do, but {name} "
-                f"changes from sample to sample; use form='matrix' or 'direct'"
-            )
-
-
 def goes_with_series(system: System, control: Any) -> None:
     """Raise unless the rates are smooth within a step, so that the last terms of a series estimate its error."""
     instead = "use another method, such as dop853"

@@ -24,6 +24,6 @@ def times(matrix: Array, columns: "Sequence[Array] | Array", *, fused: bool = Fa
     return total
 
 
-def product(a: Array, b: Array, *, fused: bool = False) -> Array:
+def product(a: Array, b: Array) -> Array:
     """The matrix product of a and b."""
-    return times(a[:, :, np.newaxis], b, fused=fused)
+    return times(a[:, :, np.newaxis], b)

@@ -17,13 +17,8 @@ if TYPE_CHECKING:
     from ..model.systems import System
 
 
-def check(system: System, method: Method, form: str = "direct") -> None:
-    """Raise if this system, method or form does not work with float32."""
-    if form == "power":
-        raise UnsupportedError(
-            "dtype: float32 does not work with form='power': each squaring of a matrix doubles the error of the power, which is "
-            "2⁻²⁴ times the steps in the end; use form='matrix', or round the states of float64"
-        )
+def check(system: System, method: Method) -> None:
+    """Raise if this system or method does not work with float32."""
     if method.has_series:
         raise UnsupportedError(
             f"dtype: float32 does not work with {method.name}, whose series are computed in float64 only; use float64, or a "
@@ -36,9 +31,9 @@ def check(system: System, method: Method, form: str = "direct") -> None:
         )
 
 
-def step(system: System, method: Method, form: str, dt: float) -> float:
-    """The step rounded to float32; raise if it is out of range, or if this system, method or form does not work with float32."""
-    check(system, method, form)
+def step(system: System, method: Method, dt: float) -> float:
+    """The step rounded to float32; raise if it is out of range, or if this system or method does not work with float32."""
+    check(system, method)
     return rounded_step(dt)
 
 

@@ -17,7 +17,7 @@ from .result import Run
 from .short_runs import short_run
 
 if TYPE_CHECKING:
-    from ..base.literals import Backend, RunForm
+    from ..base.literals import Backend, StepForm
     from .world import World
 
 
@@ -58,7 +58,7 @@ def integrate(
     force: Any = None,
     record: str | Sequence[str] | None = (),
     events: Any = None,
-    form: RunForm = "direct",
+    form: StepForm = "direct",
     fused: bool | None = None,
     dtype: Any = None,
     t0: Any = None,
@@ -118,8 +118,7 @@ def integrate(
         events: quantities of a state whose changes of sign are located to the accuracy of the method, ``run.events``: a function
             g(t, v, y), an ``Event``, which may also stop a member, or a list of them. Goes with fixed and adaptive steps in the
             direct form (docs/howto/events.md).
-        form: ``"direct"``; ``"matrix"`` for the transition matrix of a linear system (Appendix B); ``"power"`` for powers of it,
-            which make any number of steps at once and need inputs that are constants or sinusoids.
+        form: ``"direct"``, or ``"matrix"`` for the transition matrix of a linear system (Appendix B).
         fused: compute each step with fused multiply-adds, a·b + c rounded once. The bits differ from those without, and are the
             same on every machine and with either backend. For steps of up to some 100 000 operations, and for any number of
             bodies, whose Newtonian force is then made without root and quotient (docs/theory/numerics.md).

@@ -10,7 +10,7 @@ from .. import _core
 from ..base import checks, registry
 from ..base.arrays import Array, Shape
 from ..base.reprs import of_member
-from ..errors import ArgumentError, UnsupportedError
+from ..errors import ArgumentError, UnknownNameError, UnsupportedError
 from ..model.compatibility import fits_together, one_state, velocities
 from ..model.controls import ConstraintControl, EnergyControl
 from ..model.methods import Method
@@ -20,11 +20,11 @@ from ..model.systems.base import a_system
 from . import continuation
 
 if TYPE_CHECKING:
-    from ..base.literals import Backend, RunForm
+    from ..base.literals import Backend, StepForm
     from .continuation import Continuation
     from .events import Event
 
-FORMS: tuple[RunForm, ...] = ("direct", "matrix", "power")
+FORMS: tuple[StepForm, ...] = ("direct", "matrix")
 BACKENDS: tuple[Backend, ...] = ("rust", "numpy")
 
 
@@ -129,6 +129,16 @@ def controlled(system: System, method: Method, control: Any, v: Array, y: Array,
     system = system.controlled(control, v, y, dt)
     fits_together(system, method)
     return system
+
+
+def known_form(form: Any) -> StepForm:
+    """The form; raise if there is none of that name, with what to write in place of the one that there was."""
+    if isinstance(form, str) and form == "power":
+        raise UnknownNameError(
+            "form: there is no 'power' any more. Known: direct, matrix. Without inputs n steps are "
+            "np.linalg.matrix_power(P, n) @ state, with P = sw.analyse(system, method, dt=dt).P"
+        )
+    return checks.known("form", form, FORMS)
 
 
 def event_list(events: Any, form: str) -> list[Event]:

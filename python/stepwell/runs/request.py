@@ -21,7 +21,6 @@ from ..model.compatibility import (
     fits_together,
     forced,
     goes_back,
-    goes_on_by_a_rule,
     goes_with_a_controller,
     not_with_exact,
     one_state,
@@ -36,7 +35,6 @@ from ..reference.acceptance import Acceptance
 from . import continuation, engine
 from .options import (
     BACKENDS,
-    FORMS,
     Options,
     arithmetic,
     check_algebraic,
@@ -44,6 +42,7 @@ from .options import (
     checked_system,
     controlled,
     event_list,
+    known_form,
     last_time,
     machine_of,
     options_of_resumed,
@@ -148,7 +147,7 @@ class Request(NamedTuple):
         if dt is None or steps is None:
             missing = " and ".join(name for name, value in (("dt", dt), ("steps", steps)) if value is None)
             raise ArgumentError(f"{missing}: needed for fixed steps, got None; for adaptive steps give tolerance= and at=")
-        form = checks.known("form", form, FORMS)
+        form = known_form(form)
         if method.is_exact and form == "direct":
             form = "matrix"  # which its steps are
             not_with_exact(method, force=force, events=events, control=control)
@@ -158,13 +157,11 @@ class Request(NamedTuple):
             check_matrix_form(system, method, form, force)
         watched = None if events is None else event_list(events, form)
         control = a_control(control)
-        if form == "power":
-            goes_on_by_a_rule(system)
         dt = checks.step(dt)
         if single:
             from . import float32  # only such runs need it
 
-            dt = float32.step(system, method, form, dt)
+            dt = float32.step(system, method, dt)
         if before is not None:
             continuation.goes_on_alike(before, method, dt)
         t0 = 0.0 if t0 is None else checks.beginning(t0)
@@ -424,7 +421,7 @@ class Request(NamedTuple):
         if single:
             from . import float32  # only such worlds need it
 
-            dt = float32.step(system, method, "direct", dt)
+            dt = float32.step(system, method, dt)
         if before is not None:
             continuation.goes_on_alike(before, method, dt)
         machine = machine_of(options.device, "rust")
@@ -489,7 +486,7 @@ class Request(NamedTuple):
         dt = 1.0 if options.dt is None else checks.number("dt", options.dt, positive=True, unit="units of time")
         t0 = 0.0 if options.t0 is None else checks.number("t0", options.t0, unit="units of time")
         fused, single = arithmetic(options.fused, options.dtype)
-        control, form = a_control(options.control), checks.known("form", options.form, ("direct", "matrix"))
+        control, form = a_control(options.control), known_form(options.form)
         if form != "direct" and (fused or control is not None):
             raise UnsupportedError("form: form='matrix' goes without fused=, attempt= and control=")
         if form != "direct":
@@ -499,7 +496,7 @@ class Request(NamedTuple):
         if single:
             from . import float32
 
-            dt = float32.step(system, method, form, dt)
+            dt = float32.step(system, method, dt)
             float32.check_inputs(system, t0)
         choice = method.start_choice(options.start)
         if options.force is not None:

@@ -1,4 +1,4 @@
-"""Runs by the Rust core or by the NumPy reference, in direct, matrix or power form.
+"""Runs by the Rust core or by the NumPy reference, in direct or matrix form.
 
 A slot is the array that contains a block between steps: v for most methods, the carry for those that have one. Code above this
 folder works with states, code below with slots.

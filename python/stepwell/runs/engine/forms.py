@@ -1,4 +1,4 @@
-"""A run in its form: step by step, by the transition matrix, or by its powers."""
+"""A run in its form: by the formulas of the method, or by the transition matrix."""
 
 from __future__ import annotations
 
@@ -28,5 +28,4 @@ def advance(plan: Plan, v: Array, y: Array, before: Whole | None = None, *, carr
         return advance_direct(plan, v, y, before, carried=carried)
     from . import linear  # only such runs need it
 
-    go = linear.by_matrix if plan.form == "matrix" else linear.by_power
-    return go(plan, v, y, first_bad_steps(plan, before), carried)
+    return linear.by_matrix(plan, v, y, first_bad_steps(plan, before), carried)

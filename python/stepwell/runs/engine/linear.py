@@ -1,4 +1,4 @@
-"""Linear systems: a step by the transition matrix (Appendix B), and many steps by a power of it."""
+"""Linear systems: a step by the transition matrix (Appendix B)."""
 
 from __future__ import annotations
 
@@ -13,25 +13,17 @@ from ... import _core
 from ...base import checks
 from ...base.arrays import Array, Blocks, Whole
 from ...model.parameters import aligned, flat
-from ...model.systems import Sampled
 from ...reference import run as reference
 from . import exact
 from .direct import Looped, advance_direct, finished, looped, run_by_core, to_slot, to_velocity
 from .plan import BEGINS, Outcome, Plan
 
-#: Numbers in memory at a time for each element of the matrix: unit vectors, their states after a step, the core's copies of them;
-#: and for powers the one that is squared, the product so far, and their product.
-NUMBERS_OF_AN_ELEMENT, NUMBERS_OF_A_POWER = 8, 3
+#: Numbers in memory at a time for each element of the matrix: unit vectors, their states after a step, the core's copies of them.
+NUMBERS_OF_AN_ELEMENT = 8
 
 #: This many numbers of states, and of matrices if members have their own, are stepped at once: an operation on them takes a
 #: millisecond.
 NUMBERS_AT_ONCE = 1 << 20
-
-
-def _fits(plan: Plan, numbers: int) -> None:
-    """Raise if there is no memory for transition matrices."""
-    n = prod(plan.system.v_shape) + prod(plan.system.y_shape)
-    checks.fits(f"the transition matrices of {n} × {n} numbers", float(numbers) * n * n, plan.batch, "use form='direct'")
 
 
 def transition(plan: Plan) -> Array:
@@ -153,7 +145,9 @@ def exact_model(plan: Plan) -> Any:
 
 def by_matrix(plan: Plan, v: Array, y: Array, before: Whole, carried: bool) -> Outcome:
     """The run by the transition matrix, step by step."""
-    _fits(plan, NUMBERS_OF_AN_ELEMENT)
+    n = prod(plan.system.v_shape) + prod(plan.system.y_shape)
+    numbers = float(NUMBERS_OF_AN_ELEMENT) * n * n
+    checks.fits(f"the transition matrices of {n} × {n} numbers", numbers, plan.batch, "use form='direct'")
     inputs = plan.system.given_inputs()
     p, q = transition(plan), pulses(plan, inputs)
     q = q.reshape(q.shape[0] * q.shape[1], *q.shape[2:])
@@ -228,42 +222,3 @@ def _seen(
             before = by_reference(piece, v.astype(plan.dtype, copy=False), y.astype(plan.dtype, copy=False), before)[3]
         v, y = ahead.slot, ahead.y[-1]
     return np.asarray(before)
-
-
-def by_power(plan: Plan, v: Array, y: Array, before: Whole, carried: bool) -> Outcome:
-    """The run by powers of the transition matrix; the backend computes P and Q, the reference the rest."""
-    from ...reference import power  # only this form needs it
-    from ...reference.signal import Constant, Sine
-
-    def wide(array: Any) -> Array:
-        return np.broadcast_to(array, plan.batch).reshape(-1)
-
-    _fits(plan, NUMBERS_OF_AN_ELEMENT + NUMBERS_OF_A_POWER)
-    inputs = [
-        Constant(wide(each.values[0]))
-        if isinstance(each, Sampled)
-        else Sine(wide(each.amplitude), wide(each.omega), wide(each.phase))
-        for each in exact.inputs_of(plan)
-    ]
-    members, n_v = plan.members, prod(plan.system.v_shape)
-    slot = v if carried else to_slot(plan, v, y)
-    s = np.concatenate([slot.reshape(n_v, members), y.reshape(prod(plan.system.y_shape), members)])
-    matrices = transition(plan), pulses(plan, plan.system.given_inputs())
-    p, q = (a.reshape(*a.shape[: a.ndim - len(plan.batch)], members) for a in matrices)
-
-    drive = power.Drive([each for each in inputs if isinstance(each, Sine)], plan.dt, fused=plan.fused)
-    saved, saves = (np.empty((plan.save_count, *v.shape)), np.empty((plan.save_count, *y.shape))), plan.saves
-    with np.errstate(all="ignore"):
-        step = power.one_step(p, q, inputs, exact.nodes_of(plan), drive)
-        states = power.run(step, drive, s, before.reshape(-1), t0=wide(plan.t0), first=plan.first, saves=map(int, saves))
-        for i, s in enumerate(states):
-            saved[0][i], saved[1][i] = s[:n_v].reshape(v.shape), s[n_v:].reshape(y.shape)
-            if plan.progress is not None:
-                plan.progress((i + 1) / len(saves))
-    out = finished(plan, saved[0][-1], saved, before)
-    # Velocities are computed from the carry at saved states only, so those between are not checked.
-    first_bad = out.first_bad.reshape(-1)
-    for save, v in zip(plan.saves, out.v.reshape(plan.save_count, n_v, members), strict=True):
-        bad, k = ~np.isfinite(v).all(axis=0), plan.first + int(save)
-        first_bad[bad & ((first_bad < 0) | (first_bad > k)) & (save > 0)] = k
-    return out

@@ -231,7 +231,7 @@ def _refusal(scene: Scene, candidate: Candidate, grid: Grid) -> str | None:
     try:
         one_state("advice", candidate.method)
         if candidate.dtype == "float32":
-            float32.step(scene.system, candidate.method, "direct", grid.dt(candidate.first))
+            float32.step(scene.system, candidate.method, grid.dt(candidate.first))
             float32.check_inputs(scene.system, (1.0 + SINGLE_STEP_ROUNDING) * grid.end)
             quiet_run(scene, candidate.method, dt, steps=1, dtype="float32")
         elif candidate.by == "step":

@@ -11,7 +11,6 @@ from .figures import Figures, Samples, figures
 from .maps import Observation, StabilityMap, stability_map
 from .norm import NormSweep, Settled, norm
 from .panel import Panel, panel
-from .powers import Powers, powers
 from .runs import RunPicture, run_picture
 from .verlet_friction import VerletFriction, verlet_friction
 from .zplane import Locus, Stability, stability
@@ -29,7 +28,6 @@ __all__ = [
     "Panel",
     "Peer",
     "Point",
-    "Powers",
     "RunPicture",
     "Samples",
     "Settled",
@@ -45,7 +43,6 @@ __all__ = [
     "norm",
     "panel",
     "peers",
-    "powers",
     "run_picture",
     "stability",
     "stability_map",

@@ -61,7 +61,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         "--form",
         default="direct",
         choices=FORMS,
-        help="step by the method's formulas (direct), by the transition matrix, or by its powers",
+        help="step by the method's formulas (direct) or by the transition matrix",
     )
     parser.add_argument(
         "--control",

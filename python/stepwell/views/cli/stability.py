@@ -13,20 +13,19 @@ from pathlib import Path
 from ...base import checks
 from ...errors import ArgumentError, UnsupportedError
 from ...model.methods import method
-from ..charts import Stability, powers, stability, stability_map
+from ..charts import Stability, stability, stability_map
 from ..charts.zplane import KINDS, ladder, within
 from . import options, show
 
-#: The default charts: those of all methods, and the map of each. Powers are drawn only if --charts names them.
-USUAL = (*KINDS, "map")
-CHARTS = (*USUAL, "powers")
+#: The charts: those of all methods, and the map of each.
+CHARTS = (*KINDS, "map")
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     options.method_words(parser)
     options.folder(parser, "draw the charts into this folder")
     parser.add_argument(
-        "--charts", metavar="A,B,…", help=f"charts to draw, separated by commas: {', '.join(CHARTS)} (default: all but powers)"
+        "--charts", metavar="A,B,…", help=f"charts to draw, separated by commas: {', '.join(CHARTS)} (default: all)"
     )
     parser.add_argument("--phi", type=float, metavar="RAD", help="the largest Φ = ω₀·dt (default: past the largest limit)")
     options.json(parser)
@@ -35,7 +34,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 def command(args: argparse.Namespace) -> None:
     # Check every name and requirement before any work.
     methods = options.chosen(args)
-    names = USUAL if args.charts is None else tuple(name.strip() for name in args.charts.split(","))
+    names = CHARTS if args.charts is None else tuple(name.strip() for name in args.charts.split(","))
     kinds = [checks.known("--charts", name, CHARTS) for name in dict.fromkeys(names)]
     if args.charts is not None and args.output is None:
         raise ArgumentError("-o: expected a folder for the charts of --charts, got none")
@@ -91,6 +90,4 @@ def _write(chart: Stability, folder: Path, kinds: list[str], top: float | None, 
             refused[locus.method.name] = str(error)
             continue
         written.write(folder / f"stability-map-{locus.method.name}.png", drawn.plot)
-    for locus in chart.loci if "powers" in kinds else ():
-        written.write(folder / f"powers-{locus.method.name}.png", powers(locus.method).plot)
     return refused

@@ -19,7 +19,7 @@ METHODS = ("standard_euler", "damped_euler", "false_euler", "verlet", "standard_
 @section(
     "program",
     "Seven programs. Each integrates directly or steps by its transition matrix.",
-    '`integrate(…, form="direct")`, `form="matrix"`; `form="power"` makes many steps at once',
+    '`integrate(…, form="direct")`, `form="matrix"`',
 )
 def both_forms() -> Finding:
     """The samples of both forms of each method: ω₀ = 2, T = 0.1, 200 steps from v = 0, y = 1."""
