@@ -699,7 +699,7 @@ def test_a_function_is_traced_once(monkeypatch: pytest.MonkeyPatch) -> None:
 
 RIGHT: dict[str, Any] = {"fun": decay, "t_span": (0, 1), "y0": [1.0, 2.0]}
 WRONG: list[tuple[dict[str, Any], type[Exception], str]] = [
-    ({"method": "rk4"}, UnsupportedError, "method: rk4 does not estimate its error.*write one of these: 'fehlberg'"),
+    ({"method": "rk4"}, UnsupportedError, "method: rk4 does not estimate its error.*write one of these: '.*'dop853'"),
     ({"method": "nonsense"}, UnknownNameError, "there is no 'nonsense'"),
     ({"method": 3}, DTypeError, r"method: expected a name, got 3 \(int\)"),
     ({"y0": 1.0}, ShapeError, r"y0: expected a state of shape \(n,\), got shape \(\)"),

@@ -366,6 +366,7 @@ WRONG: list[tuple[Callable[[], Any], type[StepwellError], str]] = [
     (a_method(lambda s, t, h, v, y: (v * v, y)), DTypeError, r"\*: expected a number"),
     (a_method(lambda s, t, h, v, y: (np.sin(v), y)), DTypeError, "np.sin: a method adds blocks"),
     (a_method(lambda s, t, h, v, y: (v if v else y, y)), DTypeError, "if: a block has no truth value"),
+    (a_method(lambda s, t, h, v, y: (v if v > 0 else y, y)), DTypeError, "<, >: got <a block of velocities> and 0 to compare"),
     (a_method(lambda s, t, h, v, y: (v[0], y)), DTypeError, "cannot look into a block"),
     (a_method(lambda s, t, h, v, y: (s.dv(0.5, v, y), y)), DTypeError, "s.dv: expected a time first"),
     (a_method(lambda s, t, h, v, y: (s.dv(t, y, v), y)), ShapeError, "s.dv: expected a block of velocities, got one of coord"),

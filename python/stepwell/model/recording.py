@@ -95,6 +95,14 @@ class Block:
     def __bool__(self) -> NoReturn:
         raise DTypeError("if: a block has no truth value, since a method is recorded once for all systems and states")
 
+    def _compared(self, other: Any) -> NoReturn:
+        raise DTypeError(
+            f"<, >: got {self!r} and {short(other)} to compare; a method is recorded once for all systems and states, and "
+            f"chooses nothing by their numbers; a choice between rates belongs to a system, as np.where"
+        )
+
+    __lt__ = __le__ = __gt__ = __ge__ = _compared
+
     def __getitem__(self, index: Any) -> NoReturn:
         raise DTypeError("[]: a method cannot look into a block, since it holds for systems of any size")
 
