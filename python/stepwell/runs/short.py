@@ -33,10 +33,12 @@ class ShortRun:
     def __init__(self, system: System, request: Request) -> None:
         self.system, self.request = system, request
         self._series = request.plan.method.has_derivatives
-        known = system.for_state_shapes(request.v, request.y)
-        self.numbers, self.others = known.numbers_of_step(request.plan.batch, series=self._series)
         # Comparisons of the time with parameters end steps.
-        self.is_free = not request.system.switches_by_time
+        self.is_free = system.structure() is not None and not request.system.switches_by_time
+        self.numbers, self.others = [], None  # type: list[Array], Any
+        if self.is_free:
+            known = system.for_state_shapes(request.v, request.y)
+            self.numbers, self.others = known.numbers_of_step(request.plan.batch, series=self._series)
 
     def run(self, v: Any, y: Any) -> Run | None:
         """The run from this start; None if it is to be made as any other."""
@@ -54,7 +56,7 @@ class ShortRun:
             return None
         if request.plan.single and any(np.abs(each).max(initial=0.0) > checks.LARGEST_SINGLE for each in numbers):
             return None  # others say what is wrong with them
-        return self._made(v, y, request.system.with_numbers_of(system), numbers)
+        return self._made(v, y, request.system.with_numbers_of(system, request.v, request.y), numbers)
 
     def _made(self, v: Any, y: Any, system: System, numbers: list[Array] | None) -> Run | None:
         """``numbers`` are those of the system; None if the core has no others."""

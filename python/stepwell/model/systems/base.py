@@ -278,9 +278,9 @@ class System(Immutable, ValueEquality, ABC):
             [(*value[:2], value[2].tobytes()) if type(value) is tuple else value for value in others],
         )
 
-    def with_numbers_of(self, other: System) -> System:
-        """This system, known for the shapes of a state, with the numbers of another one of the same structure."""
-        return other
+    def with_numbers_of(self, other: System, v: Array, y: Array) -> System:
+        """Another system of the same structure, known for the shapes of this state, as this one is."""
+        return other.for_state_shapes(v, y)
 
     def own_axes(self, name: str) -> int:
         """How many axes of its own an argument has that does not reach the step as it is."""

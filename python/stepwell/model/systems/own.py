@@ -188,7 +188,7 @@ class OwnSystem(System):
         structure = self.structure()
         by_shapes = {} if structure is None else structure[0].by_shapes
         if (alike := by_shapes.get((structure, key))) is not None:
-            self._met[key] = alike.with_numbers_of(self)
+            self._met[key] = alike._with_parameters(self.parameters_given)
             return self._met[key]
         refused: list[TraceError] = []
         for v_shape, y_shape in self._candidates(shapes):
@@ -222,8 +222,8 @@ class OwnSystem(System):
         """Its parameters; what else a step takes follows from its structure."""
         return list(self.parameters_given.values()), None
 
-    def with_numbers_of(self, other: System) -> OwnSystem:
-        """This system with the parameters of another one of the same structure."""
+    def with_numbers_of(self, other: System, v: Array, y: Array) -> OwnSystem:
+        """Another system of the same structure, with the operations of this one."""
         assert isinstance(other, OwnSystem)
         return self._with_parameters(other.parameters_given)
 
