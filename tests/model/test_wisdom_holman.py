@@ -115,18 +115,18 @@ def test_two_bodies_move_exactly() -> None:
 
 
 def test_the_error_falls_with_the_masses_and_the_step() -> None:
-    """As the first power of both in units of the star's, with a corrector as the second."""
-    errors = {}
+    """As the first power of both in units of the star's, with a corrector as the second, if the step is short."""
+    errors, dt = {}, DT / 2.0
     for share in (1.0, 0.25):
         bodies, v, y = planets(MASSES * np.r_[1.0, np.full(4, share)])
-        run = sw.integrate(bodies, "wisdom_holman", v=v, y=y, dt=DT, steps=2000, every=7)
-        start = sw.orbits.corrected(bodies, v, y, dt=DT)
-        better = sw.integrate(bodies, "wisdom_holman", v=start[0], y=start[1], dt=DT, steps=2000, every=7)
+        run = sw.integrate(bodies, "wisdom_holman", v=v, y=y, dt=dt, steps=2000, every=7)
+        start = sw.orbits.corrected(bodies, v, y, dt=dt)
+        better = sw.integrate(bodies, "wisdom_holman", v=start[0], y=start[1], dt=dt, steps=2000, every=7)
         errors[share] = energy_error(bodies, run.v, run.y), energy_error(bodies, *sw.orbits.uncorrected(better))
-        orbit = sw.orbits.elements(bodies, *sw.orbits.uncorrected(bodies, *start, dt=DT))
+        orbit = sw.orbits.elements(bodies, *sw.orbits.uncorrected(bodies, *start, dt=dt))
         assert np.abs(orbit.a - ELEMENTS["a"]).max() < 1e-11
-    assert errors[1.0][0] < 5e-6
-    assert errors[1.0][1] < 5e-9
+    assert errors[1.0][0] < 1.5e-6
+    assert errors[1.0][1] < 1e-9
     assert 3.0 < errors[1.0][0] / errors[0.25][0] < 5.5
     assert 10.0 < errors[1.0][1] / errors[0.25][1] < 24.0
 
@@ -138,7 +138,7 @@ def test_the_error_is_a_hundredth_of_leapfrogs() -> None:
     assert wisdom_holman < leapfrog / 500.0
 
 
-@looped("order", corrector.TIMES)
+@looped("order", corrector.KICKS)
 def test_a_corrector_has_its_order(order: int) -> None:
     """Σ 2·b·sinh(a·x) is half of ((x/2)·coth(x/2) − 1)/x up to that power of x, since each term is applied twice."""
     mp = pytest.importorskip("mpmath")
@@ -174,7 +174,7 @@ def test_what_it_is_not_for_is_refused() -> None:
         (lambda: sw.integrate(bodies, "wisdom_holman", **step, control=push), UnsupportedError, "carries v_half"),
         (lambda: sw.integrate(many, "wisdom_holman", **step | {"v": 0.0, "y": places}), UnsupportedError, motions),
         (lambda: sw.orbits.uncorrected(run), UnsupportedError, not_its),
-        (lambda: sw.orbits.corrected(bodies, v, y, dt=DT, order=4), ArgumentError, "one of 3, 5, 7, 11, 17, got 4"),
+        (lambda: sw.orbits.uncorrected(bodies, v, y, dt=DT, order=11), ArgumentError, "order: expected one of 3, 5, 7, got 11"),
     )
 
 
@@ -187,10 +187,10 @@ def test_without_kepler_motions_it_is_leapfrog() -> None:
 
 
 def test_errors_are_those_of_rebound() -> None:
-    """WHFast's, whose drifts are at the ends: half without a corrector, and the same with one."""
+    """WHFast's, whose drifts are at the ends: half without a corrector, and about the same with one."""
     rebound = pytest.importorskip("rebound")
     bodies, v, y = planets()
-    for order, low, high in ((0, 1.5, 2.5), (11, 0.5, 1.5)):
+    for order, low, high in ((0, 1.5, 2.5), (3, 1.0, 2.0), (7, 1.0, 2.0)):
         simulation = rebound.Simulation()
         simulation.G = G
         for mass, place, velocity in zip(MASSES, y, v, strict=True):

@@ -7,36 +7,26 @@ of those has as many powers of x right as it has terms.
 """
 
 import math
-from fractions import Fraction
-from functools import cache
 from typing import Any
 
 from ..base.arrays import Array, Blocks
 from .splitting import drift, kick
 
-#: Of each order how many times there are: it is correct up to that power of the step.
-TIMES = {3: 1, 5: 2, 7: 3, 11: 5, 17: 8}
+#: The time of the first kick as a share of the step; those of the others are its multiples.
+FIRST = math.sqrt(7 / 40)
 
-#: The square of the first time as a share of the step; the others are its multiples.
-FIRST_SQUARED = Fraction(7, 40)
+#: Of each order the kicks at these times, each as the fraction p/q = 2·a·b. With as many powers of x right as there are of them:
+#: Σ (p/q)·a²ᵏ = B₂ₖ₊₂/(2·(2k + 2)) for k = 0, 1, …
+KICKS = {
+    3: ((1, 24),),
+    5: ((4, 63), (-11, 504)),
+    7: ((2893, 37044), (-16741, 370440), (541, 61740)),
+}
 
-#: B₂, B₄, …, B₁₆
-BERNOULLI = tuple(Fraction(*pair) for pair in ((1, 6), (-1, 30), (1, 42), (-1, 30), (5, 66), (-691, 2730), (7, 6), (-3617, 510)))
 
-
-@cache
 def terms(order: int) -> tuple[tuple[float, float], ...]:
     """Times and kicks as shares of the step: Σ 2·b·sinh(a·x) = ½·((x/2)·coth(x/2) − 1)/x + O(x^order)."""
-    n = TIMES[order]
-    # c = 2·a·b solves Σ c·(a²)ᵏ = ½·w·(2k + 1)!, w = B₂ₖ₊₂/(2k + 2)!: equations in whole multiples of FIRST_SQUARED.
-    rows = [[pow(FIRST_SQUARED * i * i, k) for i in range(1, n + 1)] + [BERNOULLI[k] / (2 * (2 * k + 2))] for k in range(n)]
-    for p in range(n):  # by Gauss and Jordan; no pivot is zero
-        rows[p] = [each / rows[p][p] for each in rows[p]]
-        for q in range(n):
-            if q != p:
-                rows[q] = [each - rows[q][p] * by for each, by in zip(rows[q], rows[p], strict=True)]
-    times = [i * math.sqrt(FIRST_SQUARED) for i in range(1, n + 1)]
-    return tuple((a, float(row[-1]) / (2.0 * a)) for a, row in zip(times, rows, strict=True))
+    return tuple((i * FIRST, p / q / (2.0 * i * FIRST)) for i, (p, q) in enumerate(KICKS[order], start=1))
 
 
 def corrected(s: Any, t: float, v: Array, y: Array, order: int) -> Blocks:

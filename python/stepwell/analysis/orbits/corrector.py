@@ -15,34 +15,32 @@ from ...reference import corrector
 from ...runs.result import Run
 from .hierarchy import newtonian
 
-#: The orders that there are.
-ORDERS = tuple(corrector.TIMES)
 
-
-def corrected(system: Any, v: Any, y: Any, *, dt: Any, order: int = 11) -> Blocks:
+def corrected(system: Any, v: Any, y: Any, *, dt: Any, order: int = 7) -> Blocks:
     """The start of a run by ``wisdom_holman`` whose states are to be corrected.
 
     Its steps move in coordinates that differ from the true ones by the masses of the planets in units of the star's. A run that
-    starts from the changed state and whose states are changed back has an error of the square of these masses.
+    starts from the changed state and whose states are changed back has an error of the square of these masses, and of their first
+    power a remainder that falls with the step.
 
     Args:
         system: the bodies, under Newton's force.
         v: their velocities, shape (bodies, dim, *batch).
         y: their places, likewise.
         dt: the step of the run.
-        order: 3, 5, 7, 11 or 17: the power of the step up to which the first power of the masses is gone.
+        order: 3, 5 or 7: the power of the step up to which the first power of the masses is gone.
 
     Returns:
         v and y from which to start, of the same shape.
 
     Raises:
-        ArgumentError: if an argument is wrong, or the step is too long: Kepler's motion is followed over up to 7 steps.
+        ArgumentError: if an argument is wrong, or the step is too long: Kepler's motion is followed over up to 2.6 steps.
         UnsupportedError: if the force is another one.
 
     Example:
         >>> bodies, v, y = sw.orbits.system([1.0, 1e-3, 3e-4], a=[5.2, 9.5], e=0.05, G=sw.orbits.gravity())
-        >>> start = sw.orbits.corrected(bodies, v, y, dt=0.6)
-        >>> run = sw.integrate(bodies, "wisdom_holman", v=start[0], y=start[1], dt=0.6, steps=5000, every=10)
+        >>> start = sw.orbits.corrected(bodies, v, y, dt=0.5)
+        >>> run = sw.integrate(bodies, "wisdom_holman", v=start[0], y=start[1], dt=0.5, steps=5000, every=10)
         >>> energy = bodies.energy(*(np.moveaxis(block, 0, -1) for block in sw.orbits.uncorrected(run)))
         >>> bool(np.abs(energy / energy[0] - 1.0).max() < 1e-8 < np.abs(run.energy / run.energy[0] - 1.0).max())
         True
@@ -53,7 +51,7 @@ def corrected(system: Any, v: Any, y: Any, *, dt: Any, order: int = 11) -> Block
     return _changed(bodies, v, y, checks.step(dt), corrector.corrected, order)
 
 
-def uncorrected(of: Any, v: Any = None, y: Any = None, *, dt: Any = None, order: int = 11) -> Blocks:
+def uncorrected(of: Any, v: Any = None, y: Any = None, *, dt: Any = None, order: int = 7) -> Blocks:
     """The true states of a run that began from ``orbits.corrected``.
 
     Args:
@@ -67,7 +65,7 @@ def uncorrected(of: Any, v: Any = None, y: Any = None, *, dt: Any = None, order:
         v and y, of the shape of those of the run, or of the state. Of members that diverged they are NaN.
 
     Raises:
-        ArgumentError: if an argument is wrong, or the step is too long: Kepler's motion is followed over up to 7 steps.
+        ArgumentError: if an argument is wrong, or the step is too long: Kepler's motion is followed over up to 2.6 steps.
         UnsupportedError: if the run is by another method, or has a force from outside.
 
     Example:
@@ -97,9 +95,9 @@ def uncorrected(of: Any, v: Any = None, y: Any = None, *, dt: Any = None, order:
 
 
 def _order(order: Any) -> int:
-    order = checks.count("order", order, min(ORDERS), max(ORDERS))
-    if order not in ORDERS:
-        raise ArgumentError(f"order: expected one of {', '.join(map(str, ORDERS))}, got {order}")
+    order = checks.count("order", order, -checks.LAST_STEP)  # all of one error, which names those that there are
+    if order not in corrector.KICKS:
+        raise ArgumentError(f"order: expected one of {', '.join(map(str, corrector.KICKS))}, got {order}")
     return int(order)
 
 

@@ -125,7 +125,8 @@ def export(
     traced = Traced(plan, index, alone=alone)
     writer = kind(called, Names(MEMBERS), single)
     written = Written(traced, writer)
-    text = writer.file(written, writer.remark(head(written, writer, *_example(request, index))))
+    v, y = (list(map(float, checks.member(block, index).flat)) for block in (request.v, request.y))
+    text = writer.file(written, writer.remark(head(written, writer, v, y)))
     of = "float32" if single else "float64"
     return ExportedStep(text, called, kind.title, kind.endings, system, None if alone else method, index, fused, traced.count, of)
 
@@ -148,9 +149,3 @@ def _member(member: Any, batch: Shape) -> Shape:
             raise ShapeError(f"member: the batch of shape {batch} has no members")
         checks.count("member", each, 0, n - 1)
     return tuple(checks.count("member", each, 0, n - 1) for each, n in zip(indices, batch, strict=True))
-
-
-def _example(request: Request, index: Shape) -> tuple[list[float], list[float]]:
-    """The velocities and coordinates at the start of the example."""
-    v, y = ([float(each) for each in checks.member(block, index).reshape(-1)] for block in (request.v, request.y))
-    return v, y

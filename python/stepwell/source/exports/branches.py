@@ -129,8 +129,10 @@ class Branched:
             self._find_paths()
             costs: dict[Path, int] = defaultdict(int)
             for line, path in self._paths.items():
+                name = self.nodes[line].name
+                cycles = OPERATIONS[name].cycles if name in OPERATIONS else CYCLES.get(name, 1)
                 for depth in range(1, len(path) + 1):
-                    costs[path[:depth]] += _cycles(self.nodes[line].name)
+                    costs[path[:depth]] += cycles
             cheap = {path for path, cost in costs.items() if cost < WORTH}
             both = {line for line in self._choices() if line not in self._joint and all(self._are_dear(line))}
             if not cheap and not both:
@@ -350,10 +352,6 @@ class Branched:
                 for i, branch in enumerate(places.get(of, ())):
                     if branch not in places[line][i : i + 1] and line not in branch.sets and of not in branch.keeps:
                         branch.keeps.append(of)
-
-
-def _cycles(name: str) -> int:
-    return OPERATIONS[name].cycles if name in OPERATIONS else CYCLES.get(name, 1)
 
 
 def kind_of(

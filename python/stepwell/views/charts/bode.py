@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from functools import cached_property
 from math import inf, nan, pi
 from typing import TYPE_CHECKING, Any
 
@@ -123,16 +122,13 @@ class Bode(Drawn, Table, ValueEquality):
             "refused": self.refused,
         }
 
-    @cached_property
-    def _exact_columns(self) -> dict[str, Any]:
-        return {"method": "exact", "omega": self.omega, **_polar(self.exact), "error": np.zeros_like(self.omega)}
-
     def _columns(self) -> dict[str, list[Any]]:
         methods = [
             {"method": curve.method.name, "omega": self.omega, **_polar(curve.response), "error": curve.error}
             for curve in self.curves
         ]
-        return stacked([self._exact_columns, *methods])
+        exact = {"method": "exact", "omega": self.omega, **_polar(self.exact), "error": np.zeros_like(self.omega)}
+        return stacked([exact, *methods])
 
 
 def gain(response: Complex) -> Array:

@@ -76,21 +76,16 @@ def _print(advice: Advice, notes: list[str]) -> None:
     explained = f"Evaluations: of functions (rates), for {per}; predicted: the error by theory"
     if advice.budget is not None:
         explained += f"; objects: so many fit into {advice.budget:.3g} s"
+    place = COLUMNS.index("ns>")  # nanoseconds are shown without exponents
     show.table(
         advice.title,
         columns,
-        [_without_exponents(row) for row in advice.table()],
+        [[*row[:place], show.number(float(row[place])), *row[place + 1 :]] for row in advice.table()],
         [f"{explained}.", *notes],
         answer=advice.summary(),
         least=("predicted", "objects", "dt"),
         marked=0,
     )
-
-
-def _without_exponents(row: tuple[str, ...]) -> list[str]:
-    """The row with its nanoseconds as plain numbers."""
-    place = COLUMNS.index("ns>")
-    return [*row[:place], show.number(float(row[place])), *row[place + 1 :]]
 
 
 def _frame(text: str) -> float | None:

@@ -48,11 +48,8 @@ def advised(scene: Scene, progress: Callable[[float], object] | None, *, by: str
     if rows:
         names = ", ".join(dict.fromkeys(row.method.name for row in rows))
         others = f"the cheapest of {names}" if "," in names else "the only one of a few"
-        return min(rows, key=_price), f"{others} with an error below {ERROR:g}; --method NAME takes another"
+        cheapest = min(rows, key=lambda row: row.evaluations_per_time * (PRICE if row.method.is_implicit else 1.0))
+        return cheapest, f"{others} with an error below {ERROR:g}; --method NAME takes another"
     if by == "tolerance":
         return None, f"no: {ADAPTIVE} is usual with a tolerance; --method NAME takes another"
     return None, f"no: {reason}; {USUAL} is usual"
-
-
-def _price(row: Row) -> float:
-    return row.evaluations_per_time * (PRICE if row.method.is_implicit else 1.0)

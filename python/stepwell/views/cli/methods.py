@@ -8,7 +8,7 @@ from typing import Any
 from ...errors import ArgumentError
 from ...model.methods import Method, method, methods, stable_for
 from . import options, show
-from .sections import HOFFMANN, section
+from .show import HOFFMANN, section
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:

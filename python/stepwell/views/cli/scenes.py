@@ -9,7 +9,7 @@ import argparse
 
 from ...scenes import scenes
 from . import options, show
-from .sections import HOFFMANN, section
+from .show import HOFFMANN, section
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:

@@ -36,6 +36,14 @@ NAME = 21
 TABLE_FILES = (".csv", ".json", ".md")
 TABLE_TEXT = f"write the table: {', '.join(TABLE_FILES)}"
 
+#: The name of a column of sections.
+HOFFMANN = "Hoffmann (2002)"
+
+
+def section(name: str) -> str:
+    """A section as tables show it: a dash for what is not in Hoffmann (2002)."""
+    return name.replace("Appendix", "App.") if name.startswith(("§", "Appendix")) else "–"
+
 
 def warn(message: str) -> None:
     """Print a message on standard error, wrapped between words."""

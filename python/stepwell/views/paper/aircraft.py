@@ -2,23 +2,15 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 
 from ...analysis.stability import stability_limit
 from ...model.systems.aircraft import Aircraft
 from ...runs.making import quietly
-from ...scenes import scene
-from ..charts import run_picture
 from . import Finding, Section
+from .pictures import motion
 
 section = Section("App. E")
-
-
-def _draw(path: Path) -> object:
-    turns = scene("aircraft")
-    return run_picture(turns, turns.run("false_euler", every=1)).plot(path)
 
 
 @section(
@@ -28,7 +20,7 @@ def _draw(path: Path) -> object:
     "`sw.Aircraft(roll=…, pitch=…)`; `stepwell run aircraft`",
     "Initial state, commands and duration are not printed, and the display shows −θ and −ψ. `While φ > 180` takes very long for "
     "large angles; here it is a remainder.",
-    draw=_draw,
+    draw=motion("aircraft"),
 )
 def aircraft_turns() -> Finding:
     """The steady turn under a commanded roll of 30°, which is not reached: the controllers have no integral part."""

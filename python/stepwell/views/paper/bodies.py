@@ -11,16 +11,10 @@ from ...model.controls import EnergyControl
 from ...scenes import scene
 from ...scenes.base import quiet_run
 from ...scenes.builtin.energy_control import energy_control
-from ..charts import run_picture
 from . import Finding, Section
-from .pictures import paths
+from .pictures import motion, paths
 
 section_c, section_d = Section("App. C"), Section("App. D")
-
-
-def _draw_clover(path: Path) -> object:
-    clover = scene("clover")
-    return run_picture(clover, clover.run("false_euler", steps=100, every=1)).plot(path)
 
 
 @section_c(
@@ -29,7 +23,7 @@ def _draw_clover(path: Path) -> object:
     "`sw.scenes.clover()`; `stepwell run clover`",
     "The program divides by the squared distance: the force is 1/r, and the true orbit is the unit circle. Its first step reads "
     "positions before they are set; the old ones are meant.",
-    draw=_draw_clover,
+    draw=motion("clover", steps=100),
 )
 def clover() -> Finding:
     """The radii in the first 100 steps lie on both sides of 1."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,8 +14,8 @@ from ...scenes import scene
 from ...studies.advice import advise
 from ..charts import control as control_chart
 from ..charts import norm as norm_chart
-from ..charts import run_picture
 from . import Finding, Section
+from .pictures import motion
 
 section = Section("§12")
 
@@ -102,17 +101,13 @@ def satellite() -> Finding:
     )
 
 
-def _draw_rods(path: Path) -> object:
-    return control_chart("conical_pendulum").plot(path)
-
-
 @section(
     "advice",
     "A pendulum in x, y and z: the length of the rod is a priori constant, and its deviation is the control term.",
     '`sw.Pendulum3D`, `sw.Rods`; `sw.LengthControl(c)`, `sw.Projection("length")`; `sw.charts.control`',
     "Control is better than resetting only for False and Damped Euler. For others resetting is better: control reduces them to "
     "second order or less.",
-    draw=_draw_rods,
+    draw=lambda path: control_chart("conical_pendulum").plot(path),
 )
 def pendulum_in_space() -> Finding:
     """The largest energy error of a 90° swing over 75 units of time with T = 0.01, by control and by resetting."""
@@ -130,16 +125,12 @@ def pendulum_in_space() -> Finding:
     )
 
 
-def _draw_norm(path: Path) -> object:
-    return norm_chart().plot(path)
-
-
 @section(
     "advice",
     "The norm of a quaternion can be stabilised; resetting it to one may work, but control is probably better.",
     '`sw.RigidBody`; `sw.NormControl(k)`, `sw.Projection("norm")`; `sw.charts.norm`',
     "It is better for Euler at a steady rate. Resetting does not change the attitude; control degrades methods of higher order.",
-    draw=_draw_norm,
+    draw=lambda path: norm_chart().plot(path),
 )
 def quaternion_norm() -> Finding:
     """The relative error of the angle of a step: Standard Euler at a steady rate, Φ = h|ω|/2 = 0.1."""
@@ -156,17 +147,12 @@ def quaternion_norm() -> Finding:
     return Finding(holds, f"Φ = 0.1: {wrong[0]:+.2e} a step with resetting (−Φ²/3), {wrong[1]:+.2e} under control (+Φ²/6)")
 
 
-def _draw_springs(path: Path) -> object:
-    bridge = scene("rope_bridge")
-    return run_picture(bridge, bridge.run("false_euler", every=1)).plot(path)
-
-
 @section(
     "advice",
     "Mass and spring systems by False Euler.",
     "`sw.Springs`, `sw.Chain`; `Springs.safe_step(method)`; `sw.scenes.cloth()`, `rope_bridge()`, `jelly_cube()`",
     "The limit of a net is known before the run: h²·ω² < 4 for its fastest oscillation.",
-    draw=_draw_springs,
+    draw=motion("rope_bridge"),
 )
 def spring_nets() -> Finding:
     """Ten masses on a line, stepped by 99 % and by 150 % of the safe step."""

@@ -218,16 +218,12 @@ def verlet_cost() -> Finding:
     return Finding(fits, text)
 
 
-def _draw_friction(path: Path) -> object:
-    return verlet_friction().plot(path)
-
-
 @section_8(
     "warning",
     "Forces that depend on the velocity, such as viscous drag and Coulomb friction, are a big problem for Verlet.",
     "`Oscillator(drag=…, friction=…)`; `sw.charts.verlet_friction()`, `sw.scenes.sliding_block()`",
     "Verlet refuses such systems. With the secant as the velocity, which only this figure uses, a block never comes to rest.",
-    draw=_draw_friction,
+    draw=lambda path: verlet_friction().plot(path),
 )
 def verlet_and_friction() -> Finding:
     """The position of a sliding block after 5 s: by Verlet with the secant, by False Euler, and exactly."""

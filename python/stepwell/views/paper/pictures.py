@@ -1,16 +1,29 @@
-"""Hoffmann's pictures for which there is no chart."""
+"""Hoffmann's pictures: motions of scenes, and those for which there is no chart."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Any
 
 from ...base.arrays import Array
 from ...base.pictures import drawn
+from ...scenes import scene
+from ..charts import run_picture
 from ..charts.style import GREY, Figure, page
 
 #: The colours of three bodies. They differ in lightness, too, so that they can be told apart in grey.
 BODIES = ("#0072b2", "#e69f00", "#222222")
+
+
+def motion(name: str, **options: Any) -> Callable[[Path], object]:
+    """Draws the motion of a scene by False Euler."""
+
+    def draw(path: Path) -> object:
+        moving = scene(name)
+        return run_picture(moving, moving.run("false_euler", every=1, **options)).plot(path)
+
+    return draw
 
 
 def paths(path: Path, title: str, about: str, panels: Sequence[tuple[str, Array]], reach: float) -> object:

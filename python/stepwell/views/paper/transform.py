@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
 
 import numpy as np
 
@@ -77,15 +76,11 @@ def angle() -> Finding:
     return Finding(abs(math.degrees(step.angle) - 150.0) < 1e-9, f"atan2 {math.degrees(step.angle):.1f}°, arctan {wrong:.1f}°")
 
 
-def _draw_harmonic(path: Path) -> object:
-    return figures().plot_harmonic(path)
-
-
 @section(
     "figure",
     "Harmonic samples with 30°, 90° and 150° a step have 12, 4 and 2.4 samples per period.",
     "`analyse(…).samples_per_period`; `sw.charts.figures().plot_harmonic()`",
-    draw=_draw_harmonic,
+    draw=lambda path: figures().plot_harmonic(path),
 )
 def harmonic_cases() -> Finding:
     """The samples per period of False Euler, which is harmonic for every Φ below 2."""
