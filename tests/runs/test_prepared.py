@@ -7,6 +7,7 @@ import math
 import pickle
 import re
 import threading
+import warnings
 import weakref
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
@@ -16,7 +17,7 @@ import numpy as np
 import pytest
 import stepwell as sw
 from stepwell.runs import short_runs as module
-from support.cases import number
+from support.cases import SYSTEMS, number
 from support.families import family
 from support.heard import heard
 from support.looped import looped
@@ -446,6 +447,30 @@ def test_other_numbers_of_a_system_take_the_short_way(monkeypatch: pytest.Monkey
                 assert_same(got, run)
                 assert repr(got.system) == repr(system), kind
     assert len({run.y.tobytes() for run in expected}) == len(set(numbers))
+
+
+def test_other_numbers_of_every_system_are_its_own() -> None:
+    """Of every kind there is, with numbers, inputs and parts drawn anew: what was prepared of one is never the run of another."""
+    ways = [("rk4", DT), ("false_euler", {**DT, "every": 4}), ("dop853", {"tolerance": 1e-6, "at": [0.3, 0.7]})]
+    ways += [("rk4", {**DT, "dtype": "float32"}), ("rosenbrock23", {"tolerance": 1e-4, "at": 0.5})]
+    kept = 0
+    for name, make in SYSTEMS.items():
+        method, options = ways[number(name, "way") % len(ways)]
+        b = 1 + 2 * (number(name, "members") % 2)
+        systems = [make(np.random.default_rng(number(name, k)), b) for k in range(4)]
+        rng = np.random.default_rng(number(name))
+        v, y = 0.3 * rng.normal(size=(*systems[0].v_shape, b)), rng.normal(size=(*systems[0].y_shape, b))
+        module._kept.clear()
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            try:
+                runs = [(k, sw.integrate(systems[k], method, v=v, y=y, **options)) for k in (0, 1, 2, 0, 0, 3, 1)]
+            except sw.errors.UnsupportedError:  # of this kind by this method
+                continue
+            kept += any(each.run is not None for each in module._kept.values())
+            for k, run in runs:
+                assert_same(run, whole(systems[k], method, v=v, y=y, **options))
+    assert kept > 30
 
 
 def test_other_numbers_are_checked_and_judged() -> None:
