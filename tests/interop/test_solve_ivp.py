@@ -2,7 +2,9 @@
 
 import functools
 import inspect
+import math
 import types
+import warnings
 from collections.abc import Callable
 from typing import Any
 
@@ -695,6 +697,52 @@ def test_a_function_is_traced_once(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(ivp_function, "MOST_KNOWN", len(ivp_function._KNOWN))
     sw.solve_ivp(growing(0.125), (0.0, 1.0), [1.0])
     assert len(ivp_function._KNOWN) == 1  # it was full
+
+
+def test_other_args_are_other_numbers_of_the_same_operations(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A fit calls with one tuple of numbers after the other: nothing is traced anew, and nothing of a call is in the next."""
+    monkeypatch.setattr(ivp_function, "_KNOWN", {})
+
+    def driven(t: Any, y: Any, stiffness: Any, damping: Any, n: Any) -> Any:
+        return [y[1], -stiffness * y[0] ** n - damping * y[1] + np.cos(stiffness * t)]
+
+    def switched(t: Any, y: Any, at: Any, rate: Any) -> Any:
+        return [np.where(t < at, rate, -rate) - 0.1 * y[0]]
+
+    def chosen(t: Any, y: Any, rate: Any) -> Any:
+        return [rate * y[0] if rate > 0.0 else -(y[0] ** 2)]  # by the number: it is no parameter
+
+    def raised(t: Any, y: Any, power: Any) -> Any:
+        return [-(y[0] ** power)]  # nor is this one: a product takes less time
+
+    def relaxing(t: Any, y: Any, mu: Any) -> Any:
+        return [y[1], mu * (1.0 - y[0] ** 2) * y[1] - y[0]]
+
+    def passed(t: float, y: Any, *args: Any) -> Any:
+        return y[0] - 0.5 * args[0]
+
+    cases: list[tuple[Any, list[tuple[Any, ...]], int]] = [
+        (driven, [(1.0, 0.1, 3), (2.0, 0.2, 3), (1.5, 0.0, 3), (1.0, 0.1, 3)], 1),
+        (switched, [(0.5, 1.0), (0.25, 2.0), (0.75, 1.0)], 1), (relaxing, [(1.0,), (3.0,), (300.0,), (2.0,), (400.0,)], 1),
+        (chosen, [(1.0,), (-1.0,), (2.0,)], 3), (raised, [(2.0,), (3.0,), (2.5,)], 3), (relaxing, [(math.pi,), (math.tau,)], 1),
+    ]  # fmt: skip
+    for fun, every, entries in cases:
+        start = [1.0, 0.5][: 1 if fun in (switched, chosen, raised) else 2]
+        for more in ({}, {"t_eval": [0.5, 1.0]}, {"events": passed}, {"method": "LSODA"}):
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")
+                results = []
+                ivp_function._KNOWN.clear()
+                for args in every:
+                    results.append(sw.solve_ivp(fun, (0.0, 1.0), start, args=args, rtol=1e-6, **more))  # type: ignore[arg-type]
+                assert len(ivp_function._KNOWN) == entries, fun
+                for args, result in zip(every, results, strict=True):
+                    ivp_function._KNOWN.clear()
+                    alone = sw.solve_ivp(fun, (0.0, 1.0), start, args=args, rtol=1e-6, **more)  # type: ignore[arg-type]
+                    assert result.y.tobytes() == alone.y.tobytes(), (fun, args)
+                    assert (result.nfev, result.t.tolist(), result.message) == (alone.nfev, alone.t.tolist(), alone.message)
+    for args in ((math.inf, 0.1, 3), (np.float64(2.0), np.array(0.5), 3)):  # what is no finite number stands as it is
+        assert sw.solve_ivp(driven, (0.0, 0.5), [0.0, 0.0], args=args).status in (0, -1)
 
 
 RIGHT: dict[str, Any] = {"fun": decay, "t_span": (0, 1), "y0": [1.0, 2.0]}

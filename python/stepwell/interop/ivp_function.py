@@ -5,33 +5,43 @@ from __future__ import annotations
 import inspect
 from collections.abc import Callable
 from functools import partial
+from inspect import Parameter, Signature
 from types import FunctionType, MethodType
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from .._core import Symbol
 from ..base import checks
 from ..errors import ArgumentError, DTypeError, TraceError
 from ..model.equations.definition import Definition
 from ..model.equations.namespace import rebound
 from ..model.equations.recognised import Unknown, identity
 from ..model.systems import System
+from ..reference.marks import Marks
 from ..runs.request import Request
+
+
+#: A function, its further arguments, the length of the state, and whether the function takes it as a column.
+Reads = tuple[Any, tuple[Any, ...], int, bool]
 
 
 class RightHandSide:
     """The function that ``stepwell.system`` runs in place of ``fun``: with its further arguments, and the shapes of SciPy."""
 
-    def __init__(self, fun: Callable[..., Any], args: tuple[Any, ...], size: int, vectorized: bool) -> None:
-        self.reads = fun, args, size, vectorized
+    def __init__(self, reads: Reads, numbers: dict[int, float]) -> None:
+        self.reads = reads
+        fun, named = reads[0], [Parameter(f"args_{i}", Parameter.KEYWORD_ONLY, default=each) for i, each in numbers.items()]
+        self.__signature__ = Signature([Parameter(name, Parameter.POSITIONAL_OR_KEYWORD) for name in "ty"] + named)
         function = plain_function(fun)
         self.__code__ = getattr(function, "__code__", None)  # by which an error finds its line
         self.__module__, self.__name__ = __name__, getattr(function, "__name__", type(fun).__name__)
         self.__qualname__ = self.__name__
 
-    def __call__(self, t: Any, y: Any) -> Any:
+    def __call__(self, t: Any, y: Any, **numbers: Any) -> Any:
         """The rates of a state."""
         fun, args, size, vectorized = self.reads
+        args = tuple(numbers.get(f"args_{i}", each) for i, each in enumerate(args))
         rates = traceable(fun)(t, y[:, np.newaxis] if vectorized else y, *args)
         shape = np.shape(rates)
         if shape == () and size == 1:
@@ -45,13 +55,25 @@ class Known(NamedTuple):
     Attributes:
         reads: the function, its arguments, the length of the state, and whether it is a column.
         system: its system.
+        has_numbers: whether arguments that are numbers are parameters of the system.
         requests: the runs that were made of it, without their starts, by what was asked for; and of calls in which equations were
             found to be stiff, by these and the start, the run that was taken.
     """
 
-    reads: Any
+    reads: Reads
     system: System
+    has_numbers: bool
     requests: dict[Any, Request]
+
+    def numbers(self) -> tuple[float, ...]:
+        """The arguments that are parameters of the system."""
+        return tuple(each for each in self.reads[1] if isinstance(each, float)) if self.has_numbers else ()
+
+    def with_numbers(self, request: Request) -> Request:
+        """A run of the system with other numbers, of this one."""
+        if request.system is self.system:
+            return request
+        return request._replace(system=self.system, plan=request.plan._replace(system=self.system))
 
 
 #: The systems of functions that are recognised, and the most that is remembered of them, and of each.
@@ -75,28 +97,58 @@ def known(fun: Any, args: tuple[Any, ...], size: int, vectorized: bool) -> Known
         TraceError: if the function does what cannot be traced.
     """
     reads = fun, args, size, vectorized
+    numbers = {i: float(each) for i, each in enumerate(args) if type(each) in (float, np.float64) and np.isfinite(each)}
     try:
-        key = identity(reads)
-        found = _KNOWN.get(key)
-        # What the one of the earlier call reads may have changed since.
-        if found is not None and identity(found.reads) == key:
+        if numbers and (found := _found(_key(reads, numbers))) is not None and found.has_numbers:
+            named = {f"args_{i}": each for i, each in numbers.items()}
+            return found._replace(reads=reads, system=found.system.with_arguments(named))
+        if (found := _found(_key(reads, {}))) is not None:
             return found
     except Unknown:
-        key = None
+        pass
     if not callable(fun):
         raise DTypeError(f"fun: expected a function fun(t, y), got {checks.short(fun)} ({type(fun).__name__})")
     if not isinstance(fun, type):
         takes("fun", fun, args)
     traceable(fun)
-    rates: Any = RightHandSide(fun, args, size, vectorized)
+    for some in (numbers, {}):  # a function may compute with a number what is not possible with any
+        try:
+            definition = Definition(RightHandSide(reads, some), 1, 1, ((0,), (size,)))  # type: ignore[arg-type]
+            system = definition().for_state_shapes(None, np.empty(size))
+        except TraceError as error:
+            if some:
+                continue
+            raise TraceError(f"fun: {error}") from error
+        if some and _raises_to(system):
+            continue
+        break
+    found = Known(reads, system, bool(some), {})
     try:
-        system = Definition(rates, 1, 1, ((0,), (size,)))().for_state_shapes(None, np.empty(size))
-    except TraceError as error:
-        raise TraceError(f"fun: {error}") from error
-    found = Known(reads, system, {})
-    if key is not None:
-        remember(_KNOWN, key, found)
+        remember(_KNOWN, _key(reads, some), found)
+    except Unknown:
+        pass
     return found
+
+
+def _key(reads: Reads, numbers: dict[int, float]) -> Any:
+    """A key of what a function reads; of its arguments that are numbers, that they are."""
+    fun, args, *others = reads
+    return identity(fun), identity((tuple("number" if i in numbers else each for i, each in enumerate(args)), *others)), *numbers
+
+
+def _found(key: Any) -> Known | None:
+    found = _KNOWN.get(key)
+    # What the one of the earlier call reads may have changed since.
+    if found is None or _key(found.reads, dict.fromkeys(key[2:], 0.0)) != key:
+        return None
+    return found
+
+
+def _raises_to(system: Any) -> bool:
+    """True if rates raise to a power that is a parameter: to a known one, a product takes a tenth of the time."""
+    marks: Marks = {}
+    system._rates(marks)
+    return any(mark.name == "power" and isinstance(mark.arguments[1], Symbol) for mark in marks.values())
 
 
 def plain_function(fun: Any) -> Any:
