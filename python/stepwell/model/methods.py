@@ -175,7 +175,6 @@ class Method(Immutable):
         return f"{self.evaluations} function evaluation{'s' * (self.evaluations != 1)}"
 
     def _repr_html_(self) -> str:
-        """The method as a table, for notebooks."""
         return facts(
             f"{self.title} ({self.name})",
             [

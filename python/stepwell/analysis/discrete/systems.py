@@ -247,7 +247,6 @@ class DiscreteSystem(ValueEquality):
         return SampledRun(np.asarray(self.dt * np.arange(len(samples)), np.float64), states, z)
 
     def _repr_html_(self) -> str:
-        """The system as a table, for notebooks."""
         n, m = self.Q.shape[:2]
         return facts(
             f"{type(self.system).__name__}, sampled ({self.how})",

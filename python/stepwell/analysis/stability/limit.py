@@ -214,7 +214,6 @@ def _is_at_rest(system: System, matrix: Array, rates: Array, v: Array, y: Array)
 
 
 def _with_modes(limit: Any, change: Callable[[Mode | None], Mode | None]) -> Any:
-    """The limit, or the limits of a batch, with changed modes."""
     if isinstance(limit, StabilityLimit):
         return StabilityLimit(limit.stable, change(limit.mode), limit.grows)
     modes = np.empty(limit.shape, dtype=object)

@@ -48,7 +48,6 @@ class _Value:
         self.value = value
 
     def at(self, t: Any) -> Any:
-        """The value."""
         return self.value
 
 
