@@ -189,7 +189,6 @@ class _Factors:
         return np.broadcast_to((dt * exponents).max(axis=0) if self._each is None else dt * exponents.max(axis=0), members.shape)
 
     def step(self, member: int) -> float:
-        """The step of a member."""
         return float(self._dt if self._each is None else self._each[member])
 
     def limit(self, member: int) -> str:

@@ -112,8 +112,6 @@ class Share(NamedTuple):
 
 
 class _Run:
-    """A run as it is made."""
-
     def __init__(self, machine: Machine, program: Any, stages: Stages, model: Any, plan: Any, pacing: Any, arrays: Any) -> None:
         self.machine, self.program, self.stages, self.plan, self.arrays = machine, program, stages, plan, arrays
         self.pacing = pacing
@@ -133,7 +131,6 @@ class _Run:
         self.reduced = self.nothing if self.observer is None else machine.room(8 * self.observer.size * members)
 
     def make(self) -> None:
-        """Make it."""
         self.call("prepare", 1, 1, self.numbers.sources, self.numbers.uniforms)
         arrays, times = self.arrays, self.times
         room = 0 if arrays.steps is None else len(arrays.steps.t)
@@ -200,7 +197,6 @@ class _Run:
         self.read(share, rows, marks, saved, steps, waypoints)
 
     def mark(self, marks: Any, name: str, width: int) -> Array:
-        """A mark of so many members."""
         numbers: Array = np.empty(width, np.int64)
         self.machine.get(numbers, marks, 8 * width * MARKS.index(name))
         return numbers
@@ -257,7 +253,6 @@ class _Kernels:
         self.of = {name: f"{self.row}{self.state + i}" for i, name in enumerate(PACE)}
 
     def text(self) -> str:
-        """The text of all kernels."""
         uniforms = [line for text in self.texts.values() for line in text.uniforms]
         out = [self.stages.head, TIMES]
         out += [

@@ -194,8 +194,6 @@ class Bodies:
 
 
 class _Run:
-    """A run as it is made."""
-
     def __init__(self, bodies: Bodies, plan: Any, arrays: Any) -> None:
         self.bodies, self.machine, self.plan, self.arrays = bodies, bodies.machine, plan, arrays
         self.stages, self.blocks = bodies.stages, bodies.blocks
@@ -219,7 +217,6 @@ class _Run:
         self.machine.start(self.bodies.program.kernel(name), -(-size // GROUP) * GROUP, GROUP, *arguments)
 
     def make(self) -> bool:
-        """Make it."""
         plan = self.plan
         if not self.arrays.carried and "start" in self.stages:
             if plan.every is not None:
@@ -454,7 +451,6 @@ class _Run:
         self.fresh = self.has_wells = True
 
     def energy(self, velocities: Any) -> Array:
-        """The energy of the state, with these velocities."""
         self.find_wells()
         self.sum_up(velocities, self.blocks[HERE])
         energies = np.empty((self.bodies.members, forces.SUMS))

@@ -97,8 +97,6 @@ def run(machine: Machine, model: Any, plan: Any, arrays: Any, numbers: Numbers |
 
 
 class _Run:
-    """A run as it is made."""
-
     def __init__(
         self, machine: Machine, program: Any, stages: Stages, plan: Any, arrays: Any, numbers: Numbers, rooms: Rooms
     ) -> None:
@@ -135,7 +133,6 @@ class _Run:
         self.machine.start(self.program.kernel(name), -(-size // self.group) * self.group, self.group, *arguments)
 
     def make(self) -> bool:
-        """Make it."""
         plan, arrays, of_time = self.plan, self.arrays, (np.float64(self.plan.t0), np.float64(self.plan.dt))
         if not self.numbers.is_prepared:  # those of a world are, from its first call on
             self.call("prepare", 1, self.numbers.sources, self.numbers.uniforms)
@@ -266,7 +263,6 @@ class _Run:
 
 
 def _kernels(stages: Stages, observer: Observer | None) -> str:
-    """The text of all kernels of a run."""
     sizes, texts = stages.sizes, stages.texts
     n_v, n_y = sizes["v"], sizes["y"]
     slots = n_v + n_y

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable
+from contextlib import suppress
 from functools import partial
 from inspect import Parameter, Signature
 from types import FunctionType, MethodType
@@ -20,7 +21,6 @@ from ..model.equations.recognised import Unknown, identity
 from ..model.systems import System
 from ..reference.marks import Marks
 from ..runs.request import Request
-
 
 #: A function, its further arguments, the length of the state, and whether the function takes it as a column.
 Reads = tuple[Any, tuple[Any, ...], int, bool]
@@ -113,7 +113,7 @@ def known(fun: Any, args: tuple[Any, ...], size: int, vectorized: bool) -> Known
     traceable(fun)
     for some in (numbers, {}):  # a function may compute with a number what is not possible with any
         try:
-            definition = Definition(RightHandSide(reads, some), 1, 1, ((0,), (size,)))  # type: ignore[arg-type]
+            definition = Definition(RightHandSide(reads, some), 1, 1, ((0,), (size,)))
             system = definition().for_state_shapes(None, np.empty(size))
         except TraceError as error:
             if some:
@@ -123,10 +123,8 @@ def known(fun: Any, args: tuple[Any, ...], size: int, vectorized: bool) -> Known
             continue
         break
     found = Known(reads, system, bool(some), {})
-    try:
+    with suppress(Unknown):
         remember(_KNOWN, _key(reads, some), found)
-    except Unknown:
-        pass
     return found
 
 

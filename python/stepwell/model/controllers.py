@@ -252,7 +252,6 @@ class Controller(Part):
         return checked
 
     def _value(self, name: str) -> Array:
-        """The numbers of a parameter."""
         numbers: Array = self.values[name]
         return numbers
 
@@ -730,7 +729,6 @@ def target(system: System, name: str) -> Target:
 
 
 def _own_axes(system: System, name: str) -> int:
-    """How many axes of its own a parameter has."""
     definition = getattr(system, "definition", None)
     return 0 if definition is None else int(definition.own_axes[name])
 

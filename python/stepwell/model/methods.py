@@ -154,25 +154,15 @@ class Method(Immutable):
 
     def _text(self) -> str:
         limit = stable_for(self.limit, "Φ = ω₀·dt", 10)
-        lines = [
-            f"{self.title}: order {self.order}, {self._costs()} per step.",
-            "",
-            self.about,
-            "",
-        ]
+        hoffmann = "Hoffmann’s " if self.section.startswith("§") else ""
+        lines = [f"{self.title}: order {self.order}, {self._costs()} per step.", "", self.about, ""]
         if self.other_names:
             lines.append(f"Also called: {', '.join(self.other_names)}.")
         if self.false_friends:
             lines.append(f"Not to be taken for: {', '.join(self.false_friends)}.")
-        lines += [
-            f"Undamped oscillator stable: {limit}.",
-            f"Source: {self._source_of()}.",
-        ]
+        source = "; ".join(filter(None, [hoffmann + self.section, self.reference]))
+        lines += [f"Undamped oscillator stable: {limit}.", f"Source: {source}."]
         return "\n".join(lines)
-
-    def _source_of(self) -> str:
-        hoffmann = "Hoffmann’s " if self.section.startswith("§") else ""
-        return "; ".join(filter(None, [hoffmann + self.section, self.reference]))
 
     def __repr__(self) -> str:
         return f"<method {self.name}: {self.title}, order {self.order}, {self._costs()} per step>"
@@ -185,7 +175,6 @@ class Method(Immutable):
         return f"{self.evaluations} function evaluation{'s' * (self.evaluations != 1)}"
 
     def _repr_html_(self) -> str:
-        """The method as a table, for notebooks."""
         return facts(
             f"{self.title} ({self.name})",
             [

@@ -53,7 +53,6 @@ def _of_control(system: System) -> dict[str, tuple[str, float]]:
 
 
 def _of_controller(system: System) -> dict[str, tuple[str, float]]:
-    """The parameters of the system's sampled controller."""
     controller = system.controller
     return {} if controller is None else {name: (f"controller.{name}", checks.ANY) for name in controller.tunable}
 
@@ -107,7 +106,6 @@ def with_parameters(system: System, values: dict[str, Any]) -> System:
 
 
 def _with_control(system: System, keeper: Any, values: dict[str, Any]) -> System:
-    """The system with other numbers of its control."""
     numbers = {}
     for name, value in values.items():
         check = checks.numbers if name == "target" else checks.not_negative
@@ -180,7 +178,6 @@ def of_each_member(system: System, name: str, batch: Shape) -> Array:
 
 
 def _own_axes(known: Direct, batch: Shape) -> int:
-    """How many axes of its own a parameter has."""
     numbers = known.numbers
     has_members = numbers.ndim >= len(batch) and numbers.shape[numbers.ndim - len(batch) :] == batch
     return numbers.ndim - len(batch) if has_members else numbers.ndim

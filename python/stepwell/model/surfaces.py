@@ -227,7 +227,6 @@ def _vector(argument: str, value: Any) -> Array:
 
 
 def _unit(vector: Array) -> Array:
-    """The unit vector in a direction."""
     size = np.abs(vector).max(axis=0)
     if not (size > 0.0).all():
         raise ArgumentError("normal: expected a vector with a direction, got one of length 0")

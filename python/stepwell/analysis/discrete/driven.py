@@ -25,7 +25,8 @@ def of_method(system: LinearSystem, method: Method, dt: float, omega: Array) -> 
     """
     P, finish = slots_of(system, method, dt)
     free = system.with_inputs(None)
-    parts = [one_step(engine.Plan(system.with_inputs(x), method, omega.shape, dt)) for x in _turning(omega)]
+    turning = Sinusoid(1.0, omega, 0.5 * pi), Sinusoid(1.0, omega)
+    parts = [one_step(engine.Plan(system.with_inputs(x), method, omega.shape, dt)) for x in turning]
     Q: Any = (parts[0] + 1j * parts[1])[:, np.newaxis]
     z = np.exp(1j * dt * omega)
     P, Q, after = of_states(free, method, dt, P, Q, np.zeros_like(Q), finish)
@@ -33,8 +34,3 @@ def of_method(system: LinearSystem, method: Method, dt: float, omega: Array) -> 
     C = np.eye(n) if system.C is None else system.C
     D = np.zeros((len(C), 1)) if system.D is None else system.D
     return response(P, Q + after * z, C, D, z)
-
-
-def _turning(omega: Array) -> tuple[Sinusoid, Sinusoid]:
-    """The cosine and the sine of ωt."""
-    return Sinusoid(1.0, omega, 0.5 * pi), Sinusoid(1.0, omega)

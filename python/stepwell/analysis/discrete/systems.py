@@ -247,7 +247,6 @@ class DiscreteSystem(ValueEquality):
         return SampledRun(np.asarray(self.dt * np.arange(len(samples)), np.float64), states, z)
 
     def _repr_html_(self) -> str:
-        """The system as a table, for notebooks."""
         n, m = self.Q.shape[:2]
         return facts(
             f"{type(self.system).__name__}, sampled ({self.how})",
@@ -382,13 +381,9 @@ def _warped(dt: float, prewarp: float | None) -> float:
     return 2.0 * tan(0.5 * omega * dt) / omega
 
 
-def _inputs(system: LinearSystem) -> Array:
-    return np.zeros((len(system.A), 0)) if system.B is None else system.B
-
-
 def _exactly(system: LinearSystem, dt: float, way: str, between: str | None) -> tuple[Array, Array, Array]:
     """P, Q and Q_next of the exact solution."""
-    B = _inputs(system)
+    B = np.zeros((len(system.A), 0)) if system.B is None else system.B
     if way == "impulse":
         if system.D is not None and system.D.any():
             raise UnsupportedError("how: the samples of the output for an impulse are not numbers where D leads it there at once")
@@ -409,7 +404,8 @@ def of_method(system: LinearSystem, method: Method, dt: float, between: SampleIn
     if between == "linear":
         rise = Sampled([0.0, 1.0, 2.0], dt, interpolation="linear")
         for j in range(len(names)):
-            after[:, j] = _one(system.with_inputs(_only(j, len(names), rise)), method, dt, members)
+            of_one = system.with_inputs([rise if i == j else None for i in range(len(names))])
+            after[:, j] = one_step(engine.Plan(of_one, method, np.broadcast_shapes(of_one.batch, members), dt))  # from rest
         Q = Q - after
     P, Q, after = of_states(system, method, dt, P, Q, after, finish)
     # A run sees held samples by their mean over the stretch of time of a rate: all of a step have the sample of its start.
@@ -447,14 +443,3 @@ def of_states(
         after = eigen.product("ij...,jk...->ik...", finish, after) + G
     place = np.argsort([*system.velocities, *system.coordinates])
     return P[place][:, place], Q[place], after[place]
-
-
-def _one(system: LinearSystem, method: Method, dt: float, members: Shape) -> Array:
-    """The slots after a step from rest, over a batch."""
-    slots = one_step(engine.Plan(system, method, np.broadcast_shapes(system.batch, members), dt))
-    return np.asarray(slots)
-
-
-def _only(j: int, inputs: int, x: Any) -> list[Any]:
-    """Inputs of which only one is not zero."""
-    return [x if i == j else None for i in range(inputs)]

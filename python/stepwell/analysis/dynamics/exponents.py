@@ -104,7 +104,6 @@ class Lyapunov(ValueEquality):
         return dimension
 
     def _repr_html_(self) -> str:
-        """The exponents as a table, for notebooks."""
         pairs = [("system", repr(self.system)), ("method", self.method.title), ("averaged up to t", cell(float(self.t[-1])))]
         if self.exponents.ndim > 1:
             pairs += [("members", str(prod(self.exponents.shape[1:]))), ("largest", cell(float(np.nanmax(self.exponents))))]

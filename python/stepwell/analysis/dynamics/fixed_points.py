@@ -155,7 +155,6 @@ class Equilibria(ValueEquality):
         return "\n  ".join([repr(self), *map(repr, self.found)])
 
     def _repr_html_(self) -> str:
-        """The equilibria as a table, for notebooks."""
         rows = [
             (brief(each.v), brief(each.y), each.kind, "" if each.analysis is None else each.analysis.kind) for each in self.found
         ]
@@ -453,7 +452,6 @@ def _known(
 
 
 def _kind(values: Complex, least: Array) -> str:
-    """The kind of the motion nearby."""
     if (np.abs(values) <= least).any():
         return UNDECIDED
     grows, dies = values.real > least, values.real < -least

@@ -350,7 +350,6 @@ class _Before:
         self.count, self.mass, self.centre = 1, mass, row
 
     def add(self, mass: Array, row: Array) -> None:
-        """One more body."""
         self.count, self.mass = self.count + 1, self.mass + mass
         share = np.where(self.mass > 0.0, mass / np.where(self.mass > 0.0, self.mass, 1.0), 1.0 / self.count)
         self.centre = np.where(share == 1.0, row, self.centre + share * (row - self.centre))

@@ -206,7 +206,6 @@ class Analysis(ValueEquality):
         return drawn(path, lambda: registry.task("draw_eigenvalues")(self))
 
     def _repr_html_(self) -> str:
-        """The analysis as a table, for notebooks."""
         title = f"{type(self.system).__name__} by {self.method.title}"
         if self.P.ndim > 2:
             stable = np.asarray(self.stable)
@@ -412,7 +411,6 @@ def _kind(z: Complex, single_vector: Any, tolerances: Array) -> Any:
 
 
 def _names(block: str, shape: Shape) -> list[str]:
-    """The names of a block's numbers."""
     return [block + (str(list(map(int, index))) if index else "") for index in np.ndindex(shape)]
 
 

@@ -96,7 +96,6 @@ class Criteria(tuple[Criterion, ...]):
         return shortened(f"<criteria of {', '.join(c.method.name for c in self)}; errors at Φ = {phis}>", MAX_LINE)
 
     def _repr_html_(self) -> str:
-        """The criteria as a table, for notebooks."""
         return table("The undamped oscillator by each method, Φ = ω₀·dt", *self.table())
 
     def rows(self) -> list[dict[str, Any]]:

@@ -116,7 +116,7 @@ def _ratio(p: Polynomial | Rational, q: Polynomial | Rational) -> Polynomial:
     x = Φ·g(u) the arctangent is Φ·Σ (−1)ᵏ g²ᵏ⁺¹ uᵏ/(2k + 1).
     """
     p_u, q_u = _even(p), _even(q)
-    under = _minus(q_u, _times(p_u, p_u))
+    under = [x - y for x, y in zip(q_u, _times(p_u, p_u), strict=True)]
     w = [*under[1:], Fraction(0)]
     g = _times(_root(w), _inverse(p_u))
     square = _times(g, g)
@@ -133,10 +133,6 @@ def _ratio(p: Polynomial | Rational, q: Polynomial | Rational) -> Polynomial:
 def _even(p: Polynomial | Rational) -> list[Fraction]:
     """The power series of a function of Φ² by its powers of u."""
     return p.terms(2 * TERMS)[::2]
-
-
-def _minus(a: list[Fraction], b: list[Fraction]) -> list[Fraction]:
-    return [x - y for x, y in zip(a, b, strict=True)]
 
 
 def _times(a: list[Fraction], b: list[Fraction]) -> list[Fraction]:

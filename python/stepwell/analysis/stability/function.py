@@ -57,7 +57,6 @@ class StabilityFunction(NamedTuple):
         return self.a_stable and len(self.above.coefficients) < len(self.below.coefficients)
 
     def _repr_html_(self) -> str:
-        """The polynomials' coefficients as a table, for notebooks."""
         rows = [
             [name, *(str(c) for c in p.coefficients), *[""] * (max(len(q.coefficients) for q in self) - len(p.coefficients))]
             for name, p in zip(("above the line", "below"), self, strict=True)

@@ -36,7 +36,6 @@ from .eigen import EPS
 from .limit_result import Mode, StabilityLimit, StabilityLimits, limits_of
 from .limit_search import NUMBERS_OF_AN_ELEMENT, Search, members_at_once
 from .parts import parts
-from .small_motions import free_numbers, lifted, linearised
 from .some_members import Batch
 
 #: A state is at rest if its rates are below so many roundings of the products that they are sums of.
@@ -113,7 +112,8 @@ def limit_of(system: System, method: Method, v: Array | None = None, y: Array | 
     if v is None or y is None or system.linear:
         _fit(sum(maps.size(system)), members)
     elif isinstance(system, Springs) and all(part.kind == "surfaces" for part in system.around):
-        return _of_springs(system, method, v, y, members)
+        _fit(2 * len(_free_numbers(system)), members, sum(maps.size(system)) ** 2)
+        return _with_modes(limit_of(_small_motions(system, v, y), method), partial(_lifted, system))
     else:
         _fit(sum(maps.size(system)), members)
         if (motions := _linear_part(system, method, v, y, t, members)) is not None:
@@ -214,7 +214,6 @@ def _is_at_rest(system: System, matrix: Array, rates: Array, v: Array, y: Array)
 
 
 def _with_modes(limit: Any, change: Callable[[Mode | None], Mode | None]) -> Any:
-    """The limit, or the limits of a batch, with changed modes."""
     if isinstance(limit, StabilityLimit):
         return StabilityLimit(limit.stable, change(limit.mode), limit.grows)
     modes = np.empty(limit.shape, dtype=object)
@@ -255,10 +254,31 @@ def _warn(system: System, method: Method, limit: Any) -> None:
     )
 
 
-def _of_springs(springs: Springs, method: Method, v: Array, y: Array, members: Shape) -> Any:
-    """The limit of small motions about a state."""
-    _fit(2 * len(free_numbers(springs)), members, sum(maps.size(springs)) ** 2)
-    return _with_modes(limit_of(linearised(springs, v, y), method), partial(lifted, springs))
+def _free_numbers(springs: Springs) -> Any:
+    """The numbers of a block that belong to particles that are not fixed.
+
+    A fixed particle keeps any velocity, and a net without one drifts. ``parts`` finds such motions of a linear system exactly and
+    removes them; in the eigenvalues of a whole step their rounding would hide the limit.
+    """
+    numbers = np.arange(springs.n * springs.y_shape[1]).reshape(springs.y_shape)
+    return np.delete(numbers, springs.fixed, axis=0).reshape(-1)
+
+
+def _small_motions(springs: Springs, v: Array, y: Array) -> LinearSystem:
+    """The linear system of small disturbances of a state, velocities first, with the batch of the state."""
+    free = _free_numbers(springs)
+    free_states = np.concatenate([free, springs.n * springs.y_shape[1] + free])
+    return LinearSystem(maps.rates(springs, 0.0, v, y)[np.ix_(free_states, free_states)], velocities=len(free))
+
+
+def _lifted(springs: Springs, mode: Mode | None) -> Mode | None:
+    """A mode of the small motions as a mode of the whole net."""
+    if mode is None:
+        return None
+    blocks = [np.zeros(springs.y_shape, dtype=np.complex128) for _ in range(2)]
+    for block, shape in zip(blocks, (mode.v, mode.y), strict=True):
+        block.reshape(-1)[_free_numbers(springs)] = shape
+    return mode._replace(v=blocks[0], y=blocks[1])
 
 
 def _by_parts(search: Search) -> tuple[Array, Array, Any]:

@@ -59,7 +59,6 @@ class StabilityLimit(float):
         return limit
 
     def __getnewargs__(self) -> tuple[Any, ...]:
-        """The arguments for pickle and copy."""
         return self.stable, self.mode, self.grows
 
     @property
@@ -117,15 +116,12 @@ class StabilityLimits(np.ndarray[Any, np.dtype[np.float64]]):
         return np.asarray(self.grows == self.stable)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """The function and the arguments for pickle and copy."""
         return limits_of, (self.stable, self.modes, self.grows)
 
     def __copy__(self) -> StabilityLimits:
-        """A copy with the same modes."""
         return limits_of(self.stable, self.modes, self.grows)
 
     def __deepcopy__(self, memo: Any) -> StabilityLimits:
-        """A copy with copies of the modes."""
         return limits_of(self.stable.copy(), copy.deepcopy(self.modes, memo), copy.deepcopy(self.grows, memo))
 
 

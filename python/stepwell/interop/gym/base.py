@@ -29,7 +29,6 @@ MOST_FRAMES = 1024
 
 
 def _mode(value: Any) -> AutoresetMode:
-    """The argument ``autoreset_mode``."""
     if isinstance(value, AutoresetMode):
         return value
     return AutoresetMode(checks.known("autoreset_mode", value, [each.value for each in AutoresetMode]))
@@ -342,7 +341,6 @@ class WorldVectorEnv(VectorEnv):  # type: ignore[misc]  # gymnasium's types are 
         return self.seen(), rewards, terminated, truncated
 
     def _begin(self, places: Any) -> None:
-        """Begin new episodes of the environments at these places."""
         self._put(places)
         self._restart(places)
 

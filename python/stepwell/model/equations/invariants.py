@@ -15,9 +15,8 @@ from ... import _core
 from ...errors import ArgumentError, UnsupportedError
 from ...reference.marks import recording
 from ...reference.tape.replay import Replay
-from .function import TracedFunction
 from .of_state import arguments_in_place, parameters_of
-from .series import MarkedReplay
+from .series import MarkedReplay, TracedFunction
 
 
 class Invariant(NamedTuple):

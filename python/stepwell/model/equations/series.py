@@ -5,15 +5,16 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from itertools import count
 from math import prod
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
 from ... import _core
+from ...base.arrays import Array, Shape
 from ...reference import series
 from ...reference.marks import Marks, mark, recording
+from ...reference.mass import Mass
 from ...reference.tape.replay import Replay
-from .function import TracedFunction
 
 Functions = list[tuple[Any, list[tuple[Any, Any]], tuple[float, float] | None, bool]]
 
@@ -47,7 +48,6 @@ class _Value:
         self.value = value
 
     def at(self, t: Any) -> Any:
-        """The value."""
         return self.value
 
 
@@ -131,6 +131,37 @@ class MarkedReplay(Replay):
             arguments = [on_tape[each] if isinstance(each, Line) else each for each in function.arguments]
             mark(function.name, on_tape[line], *arguments, function=function.function)
         return on_tape
+
+
+class TracedFunction(Protocol):
+    """The part of ``trace.Equations`` that invariants and Taylor series need.
+
+    Attributes:
+        v_shape: shape of a member's velocity block.
+        y_shape: shape of a member's coordinate block.
+        own_shapes: the lengths of each parameter's own axes; None for a parameter that depends on time.
+    """
+
+    v_shape: Shape
+    y_shape: Shape
+    own_shapes: dict[str, Any]
+
+    @property
+    def mass_matrix(self) -> Mass | None:
+        """The mass matrix if equations are algebraic."""
+
+    @property
+    def name(self) -> str:
+        """The name of the function."""
+
+    def own_axes(self, name: str) -> int:
+        """How many axes of its own a parameter has."""
+
+    def rates(self, t: Any, v: Array, y: Array, values: dict[str, Any], /) -> tuple[Array, Array]:
+        """The rates (v̇, ẏ) of a state."""
+
+    def of_state(self, invariant: Any, t: Any, v: Array, y: Array, values: dict[str, Any], /) -> Any:
+        """The value of an invariant at a state."""
 
 
 class OnSeries:

@@ -407,5 +407,4 @@ class Solving:
         return each.reshape((self.axes - each.ndim) * (1,) + each.shape)
 
     def _at(self, line: Any, t: Any) -> Array:
-        """The value of a line at these times."""
         return np.asarray(self.of_line(line)([], self.numbers, np.asarray(t))[0])

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ...base import checks
-from ...base.arrays import Array, Shape
+from ...base.arrays import Array
 from ...base.reprs import counted
 from ...errors import ArgumentError, DTypeError, ShapeError, UnsupportedError
 from ...reference.product import product
@@ -132,7 +132,10 @@ def of_object(argument: str, value: Any) -> Realisation:
         )
     matrices = [getattr(value, name, None) for name in "ABCD"]
     if all(each is not None for each in matrices):
-        return _of_matrices(*(checks.numbers(name, each) for name, each in zip("ABCD", matrices, strict=True)))
+        A, B, C, D = (checks.numbers(name, each) for name, each in zip("ABCD", matrices, strict=True))
+        if not A.size:
+            raise ArgumentError(f"A: expected at least one state, got none: {_GAIN}")
+        return Realisation(A, B, C, D, (), (None,) * B.shape[-1])
     num, den = (getattr(value, name, None) for name in ("num", "den"))
     if num is not None and den is not None:
         return _of_table(num, den)
@@ -144,12 +147,6 @@ def of_object(argument: str, value: Any) -> Realisation:
         f"{argument}: expected a linear system of stepwell, or an object of SciPy or python-control with A, B, C and D, "
         f"with num and den, or with zeros, poles and gain, got {checks.short(value)} ({type(value).__name__})"
     )
-
-
-def _of_matrices(A: Array, B: Array, C: Array, D: Array) -> Realisation:
-    if not A.size:
-        raise ArgumentError(f"A: expected at least one state, got none: {_GAIN}")
-    return Realisation(A, B, C, D, (), (None,) * B.shape[-1])
 
 
 def _of_table(num: Any, den: Any) -> Realisation:
@@ -255,7 +252,8 @@ def _undriven(name: str, why: str, part: Realisation) -> None:
 def _joined(rows: list[list[Array | None]], parts: tuple[Realisation, Realisation], x: tuple[Input | None, ...]) -> Realisation:
     """The system whose matrices are these blocks: A and B in two rows, C and D in the third. None is zero."""
     first, second = parts
-    batch = checks.batch_shape({f"system {i + 1}": each for i, each in enumerate(map(_batch, parts))})
+    batches = (np.broadcast_shapes(*(each.shape[2:] for each in (part.A, part.B, part.C, part.D))) for part in parts)
+    batch = checks.batch_shape({f"system {i + 1}": each for i, each in enumerate(batches)})
     D = rows[2][2]
     assert D is not None
     heights, widths = (first.size, second.size, D.shape[0]), (first.size, second.size, D.shape[1])
@@ -271,10 +269,6 @@ def _joined(rows: list[list[Array | None]], parts: tuple[Realisation, Realisatio
     n = first.size + second.size
     velocities = (*first.velocities, *(first.size + i for i in second.velocities))
     return Realisation(whole[:n, :n], whole[:n, n:], whole[n:, :n], whole[n:, n:], velocities, x)
-
-
-def _batch(part: Realisation) -> Shape:
-    return np.broadcast_shapes(*(each.shape[2:] for each in (part.A, part.B, part.C, part.D)))
 
 
 def _pair(a: Array, b: Array) -> tuple[Array, Array]:

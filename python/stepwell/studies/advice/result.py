@@ -308,7 +308,6 @@ class Advice:
         return "\n".join(lines)
 
     def _repr_html_(self) -> str:
-        """The advice as a table, for notebooks."""
         return table(self.title, COLUMNS, self.table(), [*self.summary(), *self.rejections(REASONS)])
 
     def __repr__(self) -> str:

@@ -73,7 +73,6 @@ class Peer(ValueEquality):
     order: int | None = None
 
     def __post_init__(self) -> None:
-        """Raise if an argument is wrong."""
         if not isinstance(self.name, str):
             raise DTypeError(f"name: expected a text, got {short(self.name)}")
         if not callable(self.solve):

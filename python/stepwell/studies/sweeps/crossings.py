@@ -28,8 +28,6 @@ Mask = np.ndarray[Any, np.dtype[np.bool_]]
 
 
 class _Passages(ReducedOutcome):
-    """An outcome of the passages of a level."""
-
     def __init__(self, of: Any = "y", level: float = 0.0, direction: int | Direction = 1, *, name: str | None = None) -> None:
         self.of: Of = checked(of)
         self.name = called(name, self.of) or name_of(self.of)
@@ -37,7 +35,6 @@ class _Passages(ReducedOutcome):
         self.direction = checks.direction("direction", direction)
 
     def check(self, system: System) -> None:
-        """Raise if the system has no such number."""
         possible(self.of, system)
         if self.of in ("v", "y"):
             shape = system.v_shape if self.of == "v" else system.y_shape

@@ -100,7 +100,6 @@ class ReducedOutcome(Outcome, ABC):
 
 
 def _blocks(system: System) -> tuple[str, ...]:
-    """The blocks that a system has."""
     return ("y",) if system.v_shape == (0,) else ("v", "y")
 
 
@@ -155,12 +154,10 @@ class _Several(ReducedOutcome):
         self.name = called(name, self.of)
 
     def check(self, system: System) -> None:
-        """Raise if the system has no such quantity."""
         if self.of is not None:
             possible(self.of, system)
 
     def whats(self, system: System) -> list[Of]:
-        """The quantities that are reduced."""
         return [*_blocks(system)] if self.of is None else [self.of]
 
     def rows(self, rows: Rows) -> tuple[int, ...] | None:

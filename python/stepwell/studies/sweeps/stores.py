@@ -190,15 +190,11 @@ class Zarr:
         files.put(beside, self.path, "store")
         self.group = self._zarr.open_group(self.path, mode="r+", use_consolidated=False)
 
-    def _chunks(self) -> Iterator[dict[str, Array]]:
-        for chunk in self.layout.grid.chunks(self.chunk_shape):
-            yield self._read(chunk)
-
     def finish(self) -> Any:
         """The dataset of all results, which are read from the store when they are used."""
         if BITS not in self.group.attrs:
             with self._disk():
-                self.group.attrs[BITS] = hash_of_all(self._chunks())
+                self.group.attrs[BITS] = hash_of_all(self._read(chunk) for chunk in self.layout.grid.chunks(self.chunk_shape))
         return opened(self.path)
 
 
