@@ -715,6 +715,9 @@ def test_other_args_are_other_numbers_of_the_same_operations(monkeypatch: pytest
     def raised(t: Any, y: Any, power: Any) -> Any:
         return [-(y[0] ** power)]  # nor is this one: a product takes less time
 
+    def of_a_kind(t: Any, y: Any, rate: Any) -> Any:
+        return [rate * y[0] if isinstance(rate, float) else -y[0]]
+
     def relaxing(t: Any, y: Any, mu: Any) -> Any:
         return [y[1], mu * (1.0 - y[0] ** 2) * y[1] - y[0]]
 
@@ -725,9 +728,10 @@ def test_other_args_are_other_numbers_of_the_same_operations(monkeypatch: pytest
         (driven, [(1.0, 0.1, 3), (2.0, 0.2, 3), (1.5, 0.0, 3), (1.0, 0.1, 3)], 1),
         (switched, [(0.5, 1.0), (0.25, 2.0), (0.75, 1.0)], 1), (relaxing, [(1.0,), (3.0,), (300.0,), (2.0,), (400.0,)], 1),
         (chosen, [(1.0,), (-1.0,), (2.0,)], 3), (raised, [(2.0,), (3.0,), (2.5,)], 3), (relaxing, [(math.pi,), (math.tau,)], 1),
+        (of_a_kind, [(1.0,), (-2.0,)], 2),
     ]  # fmt: skip
     for fun, every, entries in cases:
-        start = [1.0, 0.5][: 1 if fun in (switched, chosen, raised) else 2]
+        start = [1.0, 0.5][: 1 if fun in (switched, chosen, raised, of_a_kind) else 2]
         for more in ({}, {"t_eval": [0.5, 1.0]}, {"events": passed}, {"method": "LSODA"}):
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore")
