@@ -691,11 +691,14 @@ def test_a_function_is_traced_once(monkeypatch: pytest.MonkeyPatch) -> None:
                 found = sw.solve_ivp(growing(0.5), (0.0, end), [start], rtol=rtol)
                 assert found.y[0, -1] == pytest.approx(start * np.exp(0.5 * end), rel=1e-2)
     assert len(traced) == 1
-    for number, (k, options) in enumerate(((0.25, {}), (0.25, {"vectorized": True}), (0.25, {"y0": [1.0, 1.0]})), 2):
-        sw.solve_ivp(**{"fun": growing(k), "t_span": (0.0, 1.0), "y0": [1.0]} | options)
+    # Another captured number is another number of the same operations.
+    others: tuple[dict[str, Any], ...] = ({}, {"vectorized": True}, {"y0": [1.0, 1.0]}, {"fun": growing(1)})
+    for number, options in enumerate(others, 1):
+        found = sw.solve_ivp(**{"fun": growing(0.25), "t_span": (0.0, 1.0), "y0": [1.0]} | options)
+        assert found.y[0, -1] == pytest.approx(np.exp(1.0 if "fun" in options else 0.25), rel=1e-2)
         assert len(traced) == number
     monkeypatch.setattr(ivp_function, "MOST_KNOWN", len(ivp_function._KNOWN))
-    sw.solve_ivp(growing(0.125), (0.0, 1.0), [1.0])
+    sw.solve_ivp(growing(2), (0.0, 1.0), [1.0])
     assert len(ivp_function._KNOWN) == 1  # it was full
 
 
@@ -722,27 +725,34 @@ def test_other_args_are_other_numbers_of_the_same_operations(monkeypatch: pytest
         return [y[1], mu * (1.0 - y[0] ** 2) * y[1] - y[0]]
 
     def passed(t: float, y: Any, *args: Any) -> Any:
-        return y[0] - 0.5 * args[0]
+        return y[0] - 0.5 * sum(args)
+
+    def capturing(mu: float, k: float) -> Any:
+        def helped(x: Any) -> Any:
+            return -mu * x
+
+        return lambda t, y, *args: [helped(y[0]) + k * np.sin(k * t) + sum(args)]
 
     cases: list[tuple[Any, list[tuple[Any, ...]], int]] = [
         (driven, [(1.0, 0.1, 3), (2.0, 0.2, 3), (1.5, 0.0, 3), (1.0, 0.1, 3)], 1),
         (switched, [(0.5, 1.0), (0.25, 2.0), (0.75, 1.0)], 1), (relaxing, [(1.0,), (3.0,), (300.0,), (2.0,), (400.0,)], 1),
         (chosen, [(1.0,), (-1.0,), (2.0,)], 3), (raised, [(2.0,), (3.0,), (2.5,)], 3), (relaxing, [(math.pi,), (math.tau,)], 1),
-        (of_a_kind, [(1.0,), (-2.0,)], 2),
+        (of_a_kind, [(1.0,), (-2.0,)], 2), (capturing, [(1.0,), (2.0,), (0.5, 0.25), (1.5, 0.5)], 2),
     ]  # fmt: skip
     for fun, every, entries in cases:
-        start = [1.0, 0.5][: 1 if fun in (switched, chosen, raised, of_a_kind) else 2]
+        start = [1.0, 0.5][: 1 if fun in (switched, chosen, raised, of_a_kind, capturing) else 2]
         for more in ({}, {"t_eval": [0.5, 1.0]}, {"events": passed}, {"method": "LSODA"}):
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore")
                 results = []
                 ivp_function._KNOWN.clear()
-                for args in every:
-                    results.append(sw.solve_ivp(fun, (0.0, 1.0), start, args=args, rtol=1e-6, **more))  # type: ignore[arg-type]
+                functions = [capturing(1.5, args[0]) if fun is capturing else fun for args in every]
+                for each, args in zip(functions, every, strict=True):
+                    results.append(sw.solve_ivp(each, (0.0, 1.0), start, args=args, rtol=1e-6, **more))  # type: ignore[arg-type]
                 assert len(ivp_function._KNOWN) == entries, fun
-                for args, result in zip(every, results, strict=True):
+                for each, args, result in zip(functions, every, results, strict=True):
                     ivp_function._KNOWN.clear()
-                    alone = sw.solve_ivp(fun, (0.0, 1.0), start, args=args, rtol=1e-6, **more)  # type: ignore[arg-type]
+                    alone = sw.solve_ivp(each, (0.0, 1.0), start, args=args, rtol=1e-6, **more)  # type: ignore[arg-type]
                     assert result.y.tobytes() == alone.y.tobytes(), (fun, args)
                     assert (result.nfev, result.t.tolist(), result.message) == (alone.nfev, alone.t.tolist(), alone.message)
     for args in ((math.inf, 0.1, 3), (np.float64(2.0), np.array(0.5), 3)):  # what is no finite number stands as it is

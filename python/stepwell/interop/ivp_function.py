@@ -8,7 +8,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from functools import partial
 from inspect import Parameter, Signature
-from types import FunctionType, MethodType
+from types import CellType, FunctionType, MethodType
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -25,15 +25,19 @@ from ..runs.request import Request
 
 #: A function, its further arguments, the length of the state, and whether the function takes it as a column.
 Reads = tuple[Any, tuple[Any, ...], int, bool]
+#: The numbers among what a function reads that are parameters of its system: further arguments by their places, and captured
+#: variables by their names.
+Numbers = dict[Any, Any]
 
 
 class RightHandSide:
     """The function that ``stepwell.system`` runs in place of ``fun``: with its further arguments, and the shapes of SciPy."""
 
-    def __init__(self, reads: Reads, numbers: dict[int, float]) -> None:
-        self.reads = reads
-        fun, named = reads[0], [Parameter(f"args_{i}", Parameter.KEYWORD_ONLY, default=each) for i, each in numbers.items()]
+    def __init__(self, reads: Reads, numbers: Numbers) -> None:
+        self.reads, fun = reads, reads[0]
+        named = [Parameter(name, Parameter.KEYWORD_ONLY, default=each) for name, each in named_parameters(numbers).items()]
         self.__signature__ = Signature([Parameter(name, Parameter.POSITIONAL_OR_KEYWORD) for name in "ty"] + named)
+        self._places = list(numbers)
         function = plain_function(fun)
         self.__code__ = getattr(function, "__code__", None)  # by which an error finds its line
         self.__module__, self.__name__ = __name__, getattr(function, "__name__", type(fun).__name__)
@@ -41,8 +45,7 @@ class RightHandSide:
 
     def __call__(self, t: Any, y: Any, **numbers: Any) -> Any:
         """The rates of a state."""
-        fun, args, size, vectorized = self.reads
-        args = tuple(numbers.get(f"args_{i}", each) for i, each in enumerate(args))
+        fun, args, size, vectorized = with_numbers(self.reads, dict(zip(self._places, numbers.values(), strict=True)))
         rates = traceable(fun)(t, y[:, np.newaxis] if vectorized else y, *args)
         shape = np.shape(rates)
         if shape == () and size == 1:
@@ -56,21 +59,17 @@ class Known(NamedTuple):
     Attributes:
         reads: the function, its arguments, the length of the state, and whether it is a column.
         system: its system.
-        has_numbers: whether arguments that are numbers are parameters of the system.
+        numbers: those that are parameters of the system.
         requests: the runs that were made of it, without their starts, by what was asked for; and of calls in which equations were
             found to be stiff, by these and the start, the run that was taken.
     """
 
     reads: Reads
     system: System
-    has_numbers: bool
+    numbers: Numbers
     requests: dict[Any, Request]
 
-    def numbers(self) -> tuple[float, ...]:
-        """The arguments that are parameters of the system."""
-        return tuple(each for each in self.reads[1] if isinstance(each, float)) if self.has_numbers else ()
-
-    def with_numbers(self, request: Request) -> Request:
+    def of_numbers(self, request: Request) -> Request:
         """A run of the system with other numbers, of this one."""
         if request.system is self.system:
             return request
@@ -80,6 +79,8 @@ class Known(NamedTuple):
 #: The systems of functions that are recognised, and the most that is remembered of them, and of each.
 _KNOWN: dict[Any, Known] = {}
 MOST_KNOWN = 64
+#: Functions whose numbers are no parameters.
+_AS_THEY_ARE: dict[Any, bool] = {}
 
 
 def remember(memory: dict[Any, Any], key: Any, value: Any) -> None:
@@ -98,21 +99,22 @@ def known(fun: Any, args: tuple[Any, ...], size: int, vectorized: bool) -> Known
         TraceError: if the function does what cannot be traced.
     """
     reads = fun, args, size, vectorized
-    numbers = {i: float(each) for i, each in enumerate(args) if type(each) in (float, np.float64) and np.isfinite(each)}
+    numbers = numbers_of(reads)
     try:
-        if numbers and (found := _found(_key(reads, numbers))) is not None and found.has_numbers:
-            named = {f"args_{i}": each for i, each in numbers.items()}
-            return found._replace(reads=reads, system=found.system.with_arguments(named))
+        if numbers and (found := _found(_key(reads, numbers))) is not None:
+            system = found.system.with_arguments(named_parameters(numbers))
+            return found._replace(reads=reads, system=system, numbers=numbers)
         if (found := _found(_key(reads, {}))) is not None:
             return found
+        numbers = {} if _key(reads, numbers) in _AS_THEY_ARE else numbers
     except Unknown:
-        pass
+        numbers = {}  # which is traced at each call anyway
     if not callable(fun):
         raise DTypeError(f"fun: expected a function fun(t, y), got {checks.short(fun)} ({type(fun).__name__})")
     if not isinstance(fun, type):
         takes("fun", fun, args)
     traceable(fun)
-    for some in (numbers, {}):  # a function may compute with a number what is not possible with any
+    for some in (numbers, {}) if numbers else ({},):  # a function may do with a number what is not possible with any
         try:
             definition = Definition(RightHandSide(reads, some), 1, 1, ((0,), (size,)))
             system = definition().for_state_shapes(None, np.empty(size))
@@ -123,22 +125,54 @@ def known(fun: Any, args: tuple[Any, ...], size: int, vectorized: bool) -> Known
         if some and (_raises_to(system) or not _agrees(system, reads)):
             continue
         break
-    found = Known(reads, system, bool(some), {})
+    found = Known(reads, system, some, {})
     with suppress(Unknown):
         remember(_KNOWN, _key(reads, some), found)
+        if numbers and not some:
+            remember(_AS_THEY_ARE, _key(reads, numbers), True)
     return found
 
 
-def _key(reads: Reads, numbers: dict[int, float]) -> Any:
-    """A key of what a function reads; of its arguments that are numbers, that they are."""
-    fun, args, *others = reads
-    return identity(fun), identity((tuple("number" if i in numbers else each for i, each in enumerate(args)), *others)), *numbers
+def numbers_of(reads: Reads) -> Numbers:
+    """The finite floats among further arguments and captured variables of a function."""
+    fun, args, *_ = reads
+    every: list[tuple[Any, Any]] = list(enumerate(args))
+    if isinstance(fun, FunctionType):
+        for name, cell in zip(fun.__code__.co_freevars, fun.__closure__ or (), strict=True):
+            with suppress(ValueError):  # an empty cell
+                every.append((name, cell.cell_contents))
+    return {place: float(each) for place, each in every if type(each) in (float, np.float64) and np.isfinite(each)}
+
+
+def named_parameters(numbers: Numbers) -> Numbers:
+    """The numbers by the names of parameters."""
+    return {f"args_{place}" if isinstance(place, int) else f"captured_{place}": each for place, each in numbers.items()}
+
+
+def with_numbers(reads: Reads, numbers: Numbers) -> Reads:
+    """What a function reads, with other objects in place of its numbers."""
+    fun, args, size, vectorized = reads
+    args = tuple(numbers.get(i, each) for i, each in enumerate(args))
+    if any(isinstance(place, str) for place in numbers):
+        names, cells = fun.__code__.co_freevars, fun.__closure__
+        cells = tuple(CellType(numbers[name]) if name in numbers else cell for name, cell in zip(names, cells, strict=True))
+        again = FunctionType(fun.__code__, fun.__globals__, fun.__name__, fun.__defaults__, cells)
+        again.__kwdefaults__ = fun.__kwdefaults__
+        vars(again).update(vars(fun))
+        fun = again
+    return fun, args, size, vectorized
+
+
+def _key(reads: Reads, numbers: Numbers) -> Any:
+    """A key of what a function reads; of its numbers, that they are."""
+    fun, *others = with_numbers(reads, dict.fromkeys(numbers, "number"))
+    return identity(fun), identity(tuple(others)), *numbers
 
 
 def _found(key: Any) -> Known | None:
     found = _KNOWN.get(key)
     # What the one of the earlier call reads may have changed since.
-    if found is None or _key(found.reads, dict.fromkeys(key[2:], 0.0)) != key:
+    if found is None or _key(found.reads, dict.fromkeys(key[2:])) != key:
         return None
     return found
 

@@ -184,7 +184,7 @@ def solve_ivp(
         at = sign * (times if len(times) and times[-1] == end else np.append(times, end))
 
     asked: Any = begin, end, first, longest, relative.tobytes(), absolute.tobytes()
-    numbers = of_function.numbers()
+    numbers = tuple(of_function.numbers.values())
     start = (*asked, state.tobytes(), numbers)
     if of_function.system.switches_by_time:  # by times that the numbers set
         asked = (*asked, numbers)
@@ -200,13 +200,13 @@ def solve_ivp(
             )  # fmt: skip
             request = Request.of(of_function.system, solver, options)
             remember(of_function.requests, key, request)
-        return of_function.with_numbers(request)._replace(y=state)
+        return of_function.of_numbers(request)._replace(y=state)
 
     def made(solver: Method, instead: Method | None) -> tuple[Trajectory, list[Event], float | None]:
         """The trajectory by a method, or by another one if equations are stiff."""
         request, noted = requested(solver), [Event(each, args) for each in functions]
         if instead is not None and not noted:  # an event may end the run before that is noticed
-            request = of_function.with_numbers(of_function.requests.get(start, request))
+            request = of_function.of_numbers(of_function.requests.get(start, request))
         attempts = FIRST_ATTEMPTS if functions else MAX_ATTEMPTS if instead is None else BEFORE_A_CHECK
         trajectory = Trajectory(request, at, keeps=times is None or dense_output or bool(functions), attempts=attempts)
         values = [len(noted) * [np.nan], [each.value(begin, state) for each in noted]]
