@@ -150,7 +150,7 @@ def named_parameters(numbers: Numbers) -> Numbers:
 
 
 def with_numbers(reads: Reads, numbers: Numbers) -> Reads:
-    """What a function reads, with other objects in place of its numbers."""
+    """The objects that a function reads, with others in place of its numbers."""
     fun, args, size, vectorized = reads
     args = tuple(numbers.get(i, each) for i, each in enumerate(args))
     if any(isinstance(place, str) for place in numbers):

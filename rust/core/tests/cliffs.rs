@@ -348,9 +348,9 @@ fn what_all_members_have_in_common_is_in_no_loop() {
     }
 }
 
-/// So it takes no longer either, but for what the caches do. A mass on the ring is eight operations. Number by number and in vectors
-/// of one member's numbers, and over many members: at most so many instructions and spills for ten operations, and a tenth more than
-/// in a shorter step.
+/// So it takes no longer either, but for what the caches do. A mass on the ring is eight operations. Number by number and in
+/// vectors of one member's numbers, and over many members: at most so many instructions and spills for ten operations, and a
+/// tenth more than in a shorter step.
 #[test]
 fn a_longer_step_has_no_more_instructions_for_an_operation() {
     for level in levels() {

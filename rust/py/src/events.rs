@@ -133,8 +133,8 @@ impl EventsOf<'_> {
 /// An array of whole numbers, or of others.
 type Whole = Py<PyArray1<i64>>;
 type Real = Py<PyArray1<f64>>;
-/// Of members at rest their numbers, those of their events, whether these lead them back, since when the state was changed as often
-/// as it may be, and which events set each other off.
+/// Of members at rest their numbers, those of their events, whether these lead them back, since when the state was changed as
+/// often as it may be, and which events set each other off.
 type Rests = Vec<(i64, i64, bool, f64, Vec<bool>)>;
 /// Of each event the members, steps, shares, times and states of its occurrences; how many each member has; when members stopped;
 /// whether a saved time changed their steps; the members at rest.

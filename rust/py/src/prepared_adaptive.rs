@@ -161,9 +161,9 @@ pub(crate) fn prepared_adaptive(
 
 #[pymethods]
 impl PreparedAdaptive {
-    /// Makes the run from this start and fills the states at the times of the pacing, those at the end and the paces there. Returns 0
-    /// if nothing was made, since the start is not of floats of these shapes, or a member did not come to its end, or it takes
-    /// long, or another thread makes the run just now; 2 if it is certain that nothing can be said of it; 1 otherwise.
+    /// Makes the run from this start and fills the states at the times of the pacing, those at the end and the paces there.
+    /// Returns 0 if nothing was made, since the start is not of floats of these shapes, or a member did not come to its end, or
+    /// it takes long, or another thread makes the run just now; 2 if it is certain that nothing can be said of it; 1 otherwise.
     /// `parameters` are others of the same shapes, for this run.
     #[pyo3(signature = (v, y, saved_v, saved_y, last_v, last_y, paces, parameters=None))]
     #[allow(clippy::too_many_arguments, reason = "in Python they have names")]

@@ -408,8 +408,8 @@ impl Tape {
         Ok(Symbol { tape: Arc::clone(&self.0), id })
     }
 
-    /// Traces what the core makes of a model: the next state of a "step", an "attempt" with its pace, its "extension", the pace to "begin" with,
-    /// or a "record".
+    /// Traces what the core makes of a model: the next state of a "step", an "attempt" with its pace, its "extension", the pace
+    /// to "begin" with, or a "record".
     fn trace(&self, model: &ModelSpec, what: &str) -> PyResult<Vec<Symbol>> {
         let before = std::mem::take(&mut *lock(&self.0));
         let how = if matches!(what, "attempt" | "judged" | "extension" | "begin") { model.attempts() } else { model.how.clone() };
@@ -500,8 +500,8 @@ impl Tape {
         Ok((Tape(fused), symbols))
     }
 
-    /// These values for many members at once, from so many numbers of a state and from parameters; None if they depend on a step or
-    /// a time. Where they depend on samples, events alone take them.
+    /// These values for many members at once, from so many numbers of a state and from parameters; None if they depend on a step
+    /// or a time. Where they depend on samples, events alone take them.
     fn evaluation(&self, of: Vec<PyRef<'_, Symbol>>, states: usize) -> PyResult<Option<Evaluation>> {
         let (tape, roots) = self.with(&of)?;
         let of = match tape.precision() {

@@ -71,7 +71,7 @@ static double carried_sample(const double *samples, int count, double start, dou
     return samples[(int)i];
 }
 
-// What a step is described by.
+// The description of a step.
 typedef struct {
     double dt; // the step
     double t0; // the time of step 0

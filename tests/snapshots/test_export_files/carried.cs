@@ -31,7 +31,7 @@
 
 using System;
 
-/// What a step is described by, and the step.
+/// The description of a step, and the step.
 public sealed class Carried {
     public double dt = 0.01; // the step
     public double t0 = 0.0; // the time of step 0

@@ -64,7 +64,7 @@ class CarriedState:
 
 
 class Carried:
-    """What a step is described by, and the step."""
+    """The description of a step, and the step."""
 
     def __init__(self, **given):
         self.dt = 0.01  # the step

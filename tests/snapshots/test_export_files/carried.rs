@@ -42,7 +42,7 @@ static X_SAMPLES: [f64; 3] = [1.0, 2.0, 3.0];
 /// The samples of x.times.
 static X_TIMES_SAMPLES: [f64; 3] = [0.0, 1.0, 2.0];
 
-/// What a step is described by.
+/// The description of a step.
 #[allow(dead_code)]
 #[derive(Clone, Debug)]
 pub struct Carried {

@@ -98,7 +98,7 @@ static float controlled_logarithm(float x) {
     return 0.69314575f * a3 - (a8 - (a9 + 1.4286068e-06f * a3) - a5);
 }
 
-// What a step is described by.
+// The description of a step.
 typedef struct {
     float dt; // the step
     double t0; // the time of step 0

@@ -33,7 +33,7 @@
 using System;
 using System.Runtime.InteropServices;
 
-/// What a step is described by, and the step.
+/// The description of a step, and the step.
 public sealed class Controlled {
     public float dt = 0.01f; // the step
     public double t0 = 0.0; // the time of step 0

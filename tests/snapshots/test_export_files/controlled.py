@@ -85,7 +85,7 @@ class ControlledState:
 
 
 class Controlled:
-    """What a step is described by, and the step."""
+    """The description of a step, and the step."""
 
     def __init__(self, **given):
         self.dt = float32(0.009999999776482582)  # the step

@@ -73,7 +73,7 @@ fn logarithm(x: f32) -> f32 {
     return 0.69314575 * a2 - (a6 - (a7 + 1.4286068e-06 * a2) - a3);
 }
 
-/// What a step is described by.
+/// The description of a step.
 #[allow(dead_code, non_snake_case)]
 #[derive(Clone, Debug)]
 pub struct Controlled {

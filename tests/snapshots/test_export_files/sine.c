@@ -92,7 +92,7 @@ static double sine_sine(double x) {
     return sine_turn_sign(a8, a1);
 }
 
-// What a step is described by.
+// The description of a step.
 typedef struct {
     double dt; // the step
     double t0; // the time of step 0

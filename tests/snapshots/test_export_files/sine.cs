@@ -30,7 +30,7 @@
 
 using System;
 
-/// What a step is described by, and the step.
+/// The description of a step, and the step.
 public sealed class Sine {
     public double dt = 0.01; // the step
     public double t0 = 1.5; // the time of step 0

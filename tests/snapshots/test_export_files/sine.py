@@ -58,7 +58,7 @@ class SineState:
 
 
 class Sine:
-    """What a step is described by, and the step."""
+    """The description of a step, and the step."""
 
     def __init__(self, **given):
         self.dt = 0.01  # the step

@@ -47,7 +47,7 @@ fn sine(x: f64) -> f64 {
     return turn_sign(a3 + a3 * a4 * (a4 * (a6 + 0.008333333333333196 + a7) - 0.16666666666666666), a1);
 }
 
-/// What a step is described by.
+/// The description of a step.
 #[allow(dead_code)]
 #[derive(Clone, Debug)]
 pub struct Sine {

@@ -95,7 +95,7 @@ class Branched:
 
     @property
     def is_straight(self) -> bool:
-        """Whether the function has no branches, or none that can be written."""
+        """True if the function has no branches, or none that can be written."""
         read_later = [each for branch in branches(self.items) for each in branch.keeps]
         return not self.expensive or any(self.kind(each) == "bits" for each in read_later)
 
@@ -199,7 +199,7 @@ class Branched:
         return None
 
     def _are_dear(self, line: int) -> tuple[bool, bool]:
-        """Whether each side of a choice is computed on that side only."""
+        """True if each side of a choice is computed on that side only."""
         if (sides := self._sides(line)) is None:
             return False, False
         path = self._paths[line]
@@ -254,7 +254,7 @@ class Branched:
                 instead[line] = node.of[1 if truth else 2]
 
     def _truth(self, condition: int, known: dict[int, bool]) -> bool | None:
-        """Whether a condition holds, if that follows from known ones; else None."""
+        """True or False if a condition follows from known ones; else None."""
         if condition in known:
             return known[condition]
         name, of, _ = self.nodes[condition] if condition in self.nodes else self.operations[condition]
@@ -284,7 +284,7 @@ class Branched:
     # ---- in which order
 
     def _arranged(self, path: Path, lines: Sequence[int]) -> list[Item]:
-        """These values in order: those on this path by themselves, others in branches."""
+        """Write values in order: those on this path by themselves, others in branches."""
         here = [line for line in lines if self._paths[line] == path and line not in self._done]
         items: list[Item] = []
         for line in here:

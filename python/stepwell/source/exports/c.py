@@ -205,7 +205,7 @@ int main(void) {
 
     def _structures(self, w: Written) -> list[str]:
         p, number = self.prefix, self.types["number"]
-        lines = ["// What a step is described by.", "typedef struct {"]
+        lines = ["// The description of a step.", "typedef struct {"]
         lines += [f"    {self.type_of(each)} {each.name}{_size(each)};{self._about(each)}" for each in w.parameters]
         hoisted = [f"    {self.types[each.kind]} {each.name.removeprefix(self.me)};" for each in w.hoisted]
         hoisted += [f"    {number} {w.array}[{w.hoisted_size}];"] * bool(w.hoisted_size)

@@ -157,7 +157,7 @@ static class Example {
         using = ["using System;", "using System.Runtime.InteropServices;"] if self.single else ["using System;"]
         if re.search(r"(\b\w[\w.\[\]]*) [!=]= \1(?![\w.\[])", inside):
             using += ["", "#pragma warning disable 1718 // what differs from itself is NaN"]
-        about = "/// What a step is described by, and the step."
+        about = "/// The description of a step, and the step."
         return "\n".join([*head, "", *using, "", about, f"public sealed class {p} {{", inside, "}", "", state]) + "\n"
 
     def _with_head(self, w: Written, name: str, lines: Iterable[str]) -> list[str]:

@@ -75,7 +75,7 @@ class LaneWriter:
         return Kernel(kernel.level, {i: [lines[lane] for lane in order] for i, lines in kernel.groups.items()})
 
     def _is_direct(self, lines: Sequence[int]) -> bool:
-        """Whether the results may be written to the state at once, since nothing reads the numbers there any more."""
+        """True if the results may be written to the state at once, since nothing reads the numbers there any more."""
         if any(len(self._to.get(line, ())) != 1 for line in lines) or len({self._to[line][0][0] for line in lines}) > 1:
             return False
         for line in lines:

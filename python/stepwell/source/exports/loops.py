@@ -58,7 +58,7 @@ class Writer:
         return bits if name == "constant" else None
 
     def looped(self, lines: Sequence[int], roots: Sequence[int], source: Callable[[int], Place], *, keep: bool) -> Looped:
-        """These operations, each after its operands; with ``keep`` each has a place of its own in the array before the steps."""
+        """Operations in order, operands first; with ``keep`` each has a place of its own in the array before the steps."""
         depth: dict[int, int] = {}
         groups: dict[tuple[object, ...], list[int]] = defaultdict(list)
         array = MADE if keep else WORK

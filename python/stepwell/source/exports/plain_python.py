@@ -173,7 +173,7 @@ print(s.$shown[0])"""
     def file(self, w: Written, head: list[str]) -> str:
         """The whole text; ``head`` is the comment at its head."""
         p = camel(self.prefix)
-        step = f'class {p}:\n    """What a step is described by, and the step."""\n\n'
+        step = f'class {p}:\n    """The description of a step, and the step."""\n\n'
         step += "\n\n".join("\n".join(indented(each)) for each in self._functions(w))
         state = [f"class {p}State:", '    """A state."""', "", *indented(self._state(w))]
         whole = "\n\n\n".join([*self._tables(w), "\n".join(state), step])

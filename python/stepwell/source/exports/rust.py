@@ -143,7 +143,7 @@ fn main() {
         p, number = camel(self.prefix), self.types["number"]
         hoisted = [(each.name.removeprefix(self.me), self.types[each.kind]) for each in w.hoisted]
         capitals = any(name != name.lower() for name in [*(each.name for each in w.parameters), *(name for name, _ in hoisted)])
-        lines = ["/// What a step is described by."]
+        lines = ["/// The description of a step."]
         lines.append("#[allow(dead_code, non_snake_case)]" if capitals else "#[allow(dead_code)]")
         lines += ["#[derive(Clone, Debug)]", f"pub struct {p} {{"]
         for each in w.parameters:

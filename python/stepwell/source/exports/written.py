@@ -109,13 +109,13 @@ class Written:
 
     @property
     def of_memory(self) -> str:
-        """What the memory holds, for a comment."""
+        """The contents of the memory, for a comment."""
         controller = "what the controller remembers" if len(self.traced.memory) > self.traced.kept else ""
         return ", and ".join(each for each in ("what the method keeps" if self.traced.kept else "", controller) if each)
 
     @property
     def carries(self) -> bool:
-        """Whether the method carries something other than v."""
+        """True if the method carries something other than v."""
         return self.slot != "v"
 
     @property
@@ -125,7 +125,7 @@ class Written:
         return [each for each in both if each[2]]
 
     def forced(self, function: str) -> bool:
-        """Whether a function has an argument for a force from outside: the step if there is one, others if they read it."""
+        """True if a function has an argument for a force from outside: the step if there is one, others if they read it."""
         return function in self._forced or (function == "step" and bool(self.traced.force))
 
     @cached_property

@@ -1,5 +1,5 @@
-//! Events that change the state of a member with adaptive steps: `_Resetting` in `runs/events/adaptive.py`, which says why, for one
-//! member at a time. Such an event ends a part of its run; the next begins there as a run does.
+//! Events that change the state of a member with adaptive steps: `_Resetting` in `runs/events/adaptive.py`, which says why, for
+//! one member at a time. Such an event ends a part of its run; the next begins there as a run does.
 
 use std::sync::Arc;
 
@@ -44,8 +44,8 @@ impl Course {
 }
 
 impl Watch<'_> {
-    /// The run of a member from a time to an end, and from a state; without one it goes on, and its first part is that of an earlier
-    /// run.
+    /// The run of a member from a time to an end, and from a state; without one it goes on, and its first part is that of an
+    /// earlier run.
     pub(crate) fn course(&mut self, member: usize, [begin, end]: [f64; 2], state: Option<&[f64]>) -> Course {
         let mut memory = Memory::new(member, self.events());
         if let Some(state) = state {
@@ -171,8 +171,8 @@ impl Watch<'_> {
         there.into_iter().zip(located).filter(|(_, one)| counts(one)).map(|(change, _)| change).collect()
     }
 
-    /// Goes on with a member at rest when the event that holds it lets it go, before the end of its run, as far as some times, evenly
-    /// apart, show. Or returns the instant at which it meets another event, whose time is known, before.
+    /// Goes on with a member at rest when the event that holds it lets it go, before the end of its run, as far as some times,
+    /// evenly apart, show. Or returns the instant at which it meets another event, whose time is known, before.
     fn wakes_later(&mut self, course: &mut Course, stop: &mut Stop) -> Option<Instant> {
         let Course { memory, end, state, .. } = course;
         let (Resting { event: e, since: begin }, member, h) = (memory.rest?, memory.member, stop.step.h);

@@ -277,8 +277,8 @@ impl Watch<'_> {
         })
     }
 
-    /// An instant, with what occurs at it: of changes that are located at it or later in a part around it, the first says from which
-    /// side the quantity comes.
+    /// An instant, with what occurs at it: of changes that are located at it or later in a part around it, the first says from
+    /// which side the quantity comes.
     pub(super) fn instant(&mut self, at: Located, found: &[(Vec<Located>, Vec<Change>)], size: Numbers) -> Instant {
         let (mut side, mut due) = (Numbers::new(), smallvec![false; found.len()]);
         let here = At { member: at.step.member, t: at.t, state: &at.state };
@@ -442,7 +442,8 @@ impl Watch<'_> {
         Ahead { share, t, after, g_end: g_ends, returns }
     }
 
-    /// The share of a step at which a member that an event holds meets another at a known time; nothing else happens to it before.
+    /// The share of a step at which a member that an event holds meets another at a known time; nothing else happens to it
+    /// before.
     fn wakes_in(
         &mut self,
         memory: &mut Memory,

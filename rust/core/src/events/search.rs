@@ -102,8 +102,8 @@ pub(crate) fn bends(g: [f64; 2], slopes: [f64; 2]) -> bool {
     Part { of: 0, low: 0.0, high: 1.0, g_low, g_high, slope_low, slope_high, state: Numbers::new() }.bends()
 }
 
-/// Divides steps into parts in which g changes its sign once, ascending; and the numbers of the steps at whose start g is zero and
-/// returns to zero within rounding errors. `look` is asked for shares of steps by their numbers.
+/// Divides steps into parts in which g changes its sign once, ascending; and the numbers of the steps at whose start g is zero
+/// and returns to zero within rounding errors. `look` is asked for shares of steps by their numbers.
 pub(super) fn parted(mut parts: Vec<Part>, look: Look) -> (Vec<Part>, Vec<usize>) {
     let (mut once, mut stuck) = (Vec::new(), Vec::new());
     let count = parts.iter().map(|part| part.of + 1).max().unwrap_or(0);

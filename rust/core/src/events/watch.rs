@@ -263,7 +263,8 @@ impl<'a> Watch<'a> {
         changes.into_iter().zip(located).filter(|(_, one)| counts(one)).map(|(change, _)| change).collect()
     }
 
-    /// The same for members that came from these sides to the event at the start; and which of them return to it within roundings.
+    /// The same for members that came from these sides to the event at the start; and which of them return to it within
+    /// roundings.
     pub(super) fn within_from(
         &mut self,
         e: usize,
@@ -508,8 +509,8 @@ impl<'a> Watch<'a> {
     }
 }
 
-/// Changes of sign of one quantity: members, and for each time, length of the step, both shares of it between which the change is,
-/// quantities there, and states of the step's start and of the part's end, one after the other.
+/// Changes of sign of one quantity: members, and for each time, length of the step, both shares of it between which the change
+/// is, quantities there, and states of the step's start and of the part's end, one after the other.
 #[derive(Debug)]
 pub struct Brackets<'c> {
     /// The members.
@@ -562,7 +563,8 @@ impl Events<'_> {
         Some(self.events[e].times.as_ref()?.after(member, self.way * t)[0])
     }
 
-    /// Whether an event may occur in a step between these times, by its times or by its quantity one step before and at both ends.
+    /// Whether an event may occur in a step between these times, by its times or by its quantity one step before and at both
+    /// ends.
     pub(crate) fn may_occur(&self, e: usize, member: usize, [before, g, g_end]: [f64; 3], [t, t_end]: [f64; 2]) -> bool {
         self.next(e, member, t).map_or_else(|| may_change(before, g, g_end), |next| next <= self.way * t_end)
     }

@@ -75,8 +75,8 @@ impl OneLane {
 struct Extension {
     stage: Arc<Stage>,
     step: PreparedStage,
-    /// At the start of a step within which states are wanted: the rows of all that a lane is; and behind them, once they are asked
-    /// for, those of the coefficients, of the length of the step, and of whether it changes too much.
+    /// At the start of a step within which states are wanted: the rows of all that a lane is; and behind them, once they are
+    /// asked for, those of the coefficients, of the length of the step, and of whether it changes too much.
     rows: Aligned,
     is_known: bool,
 }

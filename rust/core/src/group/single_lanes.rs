@@ -1,4 +1,5 @@
-//! Members with adaptive steps of float32: stages and states are float32; the time, the sizes of errors and the decision are float64.
+//! Members with adaptive steps of float32: stages and states are float32; the time, the sizes of errors and the decision are
+//! float64.
 //!
 //! In float32 the sum of a time and a step keeps too little of the step, and squares of sizes leave its range. What is float64 is
 //! some dozens of operations an attempt, however large the system.

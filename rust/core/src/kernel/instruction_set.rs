@@ -32,8 +32,8 @@ pub(crate) trait InstructionSet: Sized {
         None
     }
 
-    /// The first number times two to the power of the second, a whole number; rounded once, so that no factor needs to be a normal
-    /// number. None if that takes more than one instruction.
+    /// The first number times two to the power of the second, a whole number; rounded once, so that no factor needs to be a
+    /// normal number. None if that takes more than one instruction.
     fn scale(&self) -> Option<Self::Instruction> {
         None
     }

@@ -108,8 +108,8 @@ fn waiting(nodes: &[Node], order: impl Iterator<Item = usize>) -> usize {
 
 struct Walk<'a> {
     nodes: &'a [Node],
-    /// Those that read each operation, one behind the other, and where those of an operation begin; how many of these are not there
-    /// yet, and how many of its operands are not.
+    /// Those that read each operation, one behind the other, and where those of an operation begin; how many of these are not
+    /// there yet, and how many of its operands are not.
     users: Vec<usize>,
     first: Vec<usize>,
     unread: Vec<u32>,

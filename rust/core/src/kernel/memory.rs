@@ -30,11 +30,11 @@ mod system {
 
 /// Pages that were mapped for machine code, with `MAP_JIT`.
 ///
-/// A process with the hardened runtime may write code only there, and only with the entitlement `allow-jit`: without it the mapping
-/// is refused, and there is no kernel. Pages that become executable by `mprotect` are no second way: the system does not refuse
-/// them, it kills the process when it runs them. On Apple silicon such pages are writable or executable, which each thread
-/// chooses for itself, and a thread starts with executable ones.
-/// Source: Apple, "Porting just-in-time compilers to Apple silicon".
+/// A process with the hardened runtime may write code only there, and only with the entitlement `allow-jit`: without it the
+/// mapping is refused, and there is no kernel. Pages that become executable by `mprotect` are no second way: the system does not
+/// refuse them, it kills the process when it runs them. On Apple silicon such pages are writable or executable, which each thread
+/// chooses for itself, and a thread starts with executable ones. Source: Apple, "Porting just-in-time compilers to Apple
+/// silicon".
 #[cfg(target_os = "macos")]
 #[allow(unsafe_code, reason = "maps pages for machine code")]
 mod system {

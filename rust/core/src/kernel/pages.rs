@@ -79,8 +79,8 @@ impl Pages {
             steps: tile.steps as u64,
             rounding: [0, TO_NEAREST],
         };
-        // SAFETY: the memory holds a whole function of this signature from its first byte on, and stays until `self` is dropped. It
-        // writes to the state, to `own` and to the first number of `rounding` only, and reads besides them the rows, the pool,
+        // SAFETY: the memory holds a whole function of this signature from its first byte on, and stays until `self` is dropped.
+        // It writes to the state, to `own` and to the first number of `rounding` only, and reads besides them the rows, the pool,
         // the table of the steps and the rows held that it names: inside what was asserted above. Nobody else uses the state or
         // `own` meanwhile, both are borrowed exclusively. It keeps the registers that its convention asks to keep.
         unsafe {

@@ -23,15 +23,16 @@ const MAX_SHARED: usize = 12;
 const MAX_WAITING_PER_REGISTER: usize = 2;
 /// The same for vectors one after the other of which some wait for roots and quotients, also where there are fewer registers.
 const MAX_WAITING_AROUND_SLOW: usize = 32;
-/// So many results of a single vector may wait if what has the longest way to the end goes first: of a wide step nearly all would.
+/// So many results of a single vector may wait if what has the longest way to the end goes first: of a wide step nearly all
+/// would.
 const MAX_WAITING_LONGEST: usize = 128;
 /// So many operations an interleaved vector is behind the one before it: sums of some are then made while products of others are,
 /// by other units. Fitted to the fastest numbers on the scenes of the benchmarks; less where steps are so short that it would
 /// leave gaps.
 const MAX_BEHIND: usize = 3;
 const MIN_OPERATIONS_PER_BEHIND: usize = 6;
-/// The most where a single vector leaves no registers, as with three bodies in space: side by side, all need most at once. So they
-/// are spread over the step. Fitted likewise, to two to four bodies; two vectors gain nothing by it.
+/// The most where a single vector leaves no registers, as with three bodies in space: side by side, all need most at once. So
+/// they are spread over the step. Fitted likewise, to two to four bodies; two vectors gain nothing by it.
 const MAX_BEHIND_IF_WIDE: usize = 24;
 /// Of the operations whose operands are made or under way, so many are compared, from the first one on.
 const MAX_COMPARED: usize = 64;

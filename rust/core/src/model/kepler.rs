@@ -2,7 +2,8 @@
 //!
 //! With s, the time over the distance, h = r₀·s + η·G₂ + ζ·G₃, where Gₙ = sⁿ·cₙ(β·s²), η = y·v, β = 2μ/r₀ − v², ζ = μ − β·r₀. The
 //! left side grows with s, at the rate of the distance, so it has one solution, on orbits of every kind. It is found by three
-//! improvements of fourth order from s = h/r₀. Where they do not suffice the result is NaN: a step that is too long for the orbit.
+//! improvements of fourth order from s = h/r₀. Where they do not suffice the result is NaN: a step that is too long for the
+//! orbit.
 
 use crate::tape::number::Number;
 

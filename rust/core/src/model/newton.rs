@@ -1,8 +1,9 @@
 //! Newton's method for implicit steps, in a fixed number of passes, all with the Jacobian of the start of the step.
 //!
-//! An increment d of the state is sought for which a residual is zero. The first pass is exact for a linear system, and each later
-//! one leaves of the error a share of the order of h², by which the Jacobian changes within the step. Where that share is above 1,
-//! as in a stiff rope that turns, passes lead away: the increment of the first one is kept, which no stiffness makes large.
+//! An increment d of the state is sought for which a residual is zero. The first pass is exact for a linear system, and each
+//! later one leaves of the error a share of the order of h², by which the Jacobian changes within the step. Where that share is
+//! above 1, as in a stiff rope that turns, passes lead away: the increment of the first one is kept, which no stiffness makes
+//! large.
 
 use super::program::{Block, Rates};
 

@@ -1,7 +1,8 @@
-//! Rosenbrock methods by their coefficients, as Hairer and Wanner print them (*Solving Ordinary Differential Equations II*, IV.7).
+//! Rosenbrock methods by their coefficients, as Hairer and Wanner print them (*Solving Ordinary Differential Equations II*,
+//! IV.7).
 //!
-//! Stage i is the solution of (M − γhJ)·uᵢ = γ·(h·f(t + αᵢh, y + Σ aᵢⱼuⱼ) + M·Σ cᵢⱼuⱼ + dᵢ·h²·∂f/∂t), with the Jacobian J and ∂f/∂t
-//! of the start of the step, and the mass matrix M of the system, or that of units.
+//! Stage i is the solution of (M − γhJ)·uᵢ = γ·(h·f(t + αᵢh, y + Σ aᵢⱼuⱼ) + M·Σ cᵢⱼuⱼ + dᵢ·h²·∂f/∂t), with the Jacobian J and
+//! ∂f/∂t of the start of the step, and the mass matrix M of the system, or that of units.
 
 use super::{
     program::{Block, Length, Rates, Time},

@@ -60,8 +60,8 @@ impl Table<'_> {
     }
 }
 
-/// Which of so many samples holds at a time: the last one not after it, or the first or last one outside; the first if the time is a
-/// NaN. As `reference/signal.py` has it.
+/// Which of so many samples holds at a time: the last one not after it, or the first or last one outside; the first if the time
+/// is a NaN. As `reference/signal.py` has it.
 pub(crate) fn holds_at(t: f64, start: f64, interval: f64, samples: usize) -> usize {
     let number = ((t - start) / interval * HOLD_SLACK).floor();
     if number > 0.0 { (number as usize).min(samples - 1) } else { 0 }

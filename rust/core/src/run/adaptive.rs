@@ -27,8 +27,8 @@ use crate::{
 
 pub use super::adaptive_plan::{AdaptiveRun, Arrays};
 
-/// Attempts between two checks of the lanes. A lane that comes to a saved time waits for half of them, and for all of the next ones
-/// but the first, its extra step; fewer attempts would take as much time for calls of the kernel.
+/// Attempts between two checks of the lanes. A lane that comes to a saved time waits for half of them, and for all of the next
+/// ones but the first, its extra step; fewer attempts would take as much time for calls of the kernel.
 const ATTEMPTS_BETWEEN_CHECKS: usize = 4;
 /// The most of a series, and between two calls of the monitor.
 const MOST_ATTEMPTS: usize = 16;
@@ -190,8 +190,8 @@ impl<'a> Worker<'a> {
                 self.group.set_pace(lane, pace.idle());
             }
         }
-        // Which lanes have a step to try, so that nothing is to be done for them; and how many attempts were made since the monitor
-        // was last asked.
+        // Which lanes have a step to try, so that nothing is to be done for them; and how many attempts were made since the
+        // monitor was last asked.
         let (mut runs, mut unseen) = (vec![false; assignments.len()], 0);
         while assignments.iter().any(Option::is_some) {
             for (lane, assigned) in assignments.iter_mut().enumerate() {
@@ -603,8 +603,9 @@ impl<'a> Worker<'a> {
         self.group.set_state(lane, &origin);
     }
 
-    /// Of a lane at the start of a held step: saves the state of the extra step that it has made, and sets the next one, or lets the
-    /// held step be taken. Does what [`Self::update_lane`] does, and moves nothing else. Returns false where that has more to do.
+    /// Of a lane at the start of a held step: saves the state of the extra step that it has made, and sets the next one, or lets
+    /// the held step be taken. Does what [`Self::update_lane`] does, and moves nothing else. Returns false where that has more to
+    /// do.
     fn go_within(&mut self, part: &mut Part, lane: usize, assigned: &mut Assignment) -> bool {
         let (p, n, made) = (self.plan.v.len(), self.plan.v.len() + self.plan.y.len(), assigned.origin.is_some());
         let Pace { t, h, target: until, extra, held, wall, rejected, .. } = self.places;
@@ -654,8 +655,8 @@ impl<'a> Worker<'a> {
         }
     }
 
-    /// Saves the states of a lane at times before the end of a step whose start was kept, as sums of its coefficients. Returns how
-    /// many.
+    /// Saves the states of a lane at times before the end of a step whose start was kept, as sums of its coefficients. Returns
+    /// how many.
     fn save_sums(&mut self, part: &mut Part, lane: usize, assigned: &mut Assignment, end: f64) -> usize {
         let (plan, member, first) = (self.plan, part.first + assigned.member, assigned.next);
         let mut states = std::mem::take(&mut self.sums);
@@ -791,8 +792,8 @@ impl<'a> Worker<'a> {
         self.looks.as_mut()?.held(&*self.group, lane, member, pace, (HeldEnd { h, t, state }, last))
     }
 
-    /// Where a lane stands at the end of a held step, and the state there; it is left as it is. The step that follows is as long as
-    /// the held one of a series is.
+    /// Where a lane stands at the end of a held step, and the state there; it is left as it is. The step that follows is as long
+    /// as the held one of a series is.
     fn end_of_held(&mut self, lane: usize, member: usize, pace: &Pace<f64>) -> (Pace<f64>, Vec<f64>) {
         let (start, scales) = (self.group.state(lane), self.group.scales(lane));
         self.group.set_pace(lane, Pace { held: 0.0, extra: 0.0, target: f64::INFINITY, ..*pace });
@@ -804,7 +805,8 @@ impl<'a> Worker<'a> {
         end
     }
 
-    /// Ends a member where an event stopped it: in that state, also at all later times. Or it goes on from there, as a run begins.
+    /// Ends a member where an event stopped it: in that state, also at all later times. Or it goes on from there, as a run
+    /// begins.
     fn end_at(&mut self, part: &mut Part, lane: usize, assigned: &mut Assignment, stop: &EventStop) {
         let (member, times) = (part.first + assigned.member, self.plan.at.len());
         let all = stop.rested.iter().map(|(since, state)| (*since, state)).chain([(stop.t, &stop.state)]);

@@ -21,7 +21,8 @@ pub struct AdaptiveRun<'a> {
     pub at: Vec<Row<'a>>,
     /// The times that no step crosses, by rows: those just before each, ascending, and behind them those just after.
     pub jumps: Vec<Row<'a>>,
-    /// The members' paces at the start, by rows, in the order of [`crate::step::pace::Pace::numbers`], and what stands behind them.
+    /// The members' paces at the start, by rows, in the order of [`crate::step::pace::Pace::numbers`], and what stands behind
+    /// them.
     pub paces: Vec<Row<'a>>,
     /// Whether the steps to try first and the lengths of the blocks are still to be found: see `Pace::begun`.
     pub begins: bool,
@@ -31,8 +32,8 @@ pub struct AdaptiveRun<'a> {
     pub is_part: bool,
     /// The most attempts of a member.
     pub budget: i64,
-    /// Every so manieth accepted step is kept in [`Arrays::steps`]; 0 for none. A member that has filled its rows there ends, with
-    /// a status of its own, and can go on from its pace.
+    /// Every so manieth accepted step is kept in [`Arrays::steps`]; 0 for none. A member that has filled its rows there ends,
+    /// with a status of its own, and can go on from its pace.
     pub every: i64,
     /// Velocities at the start, by rows.
     pub v: Vec<Row<'a>>,

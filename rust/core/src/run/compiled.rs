@@ -69,8 +69,8 @@ impl Interpreted {
     }
 }
 
-/// Of how many steps a run is whose step is explained: of very many, but where these would be one tape for the equations of a large
-/// system, whose listing has some ten thousand lines.
+/// Of how many steps a run is whose step is explained: of very many, but where these would be one tape for the equations of a
+/// large system, whose listing has some ten thousand lines.
 fn explained_steps(traced: &Traced) -> f64 {
     if traced.solves_rows { MIN_SOLUTIONS - 1.0 } else { f64::INFINITY }
 }

@@ -235,8 +235,8 @@ pub fn run<T: Steppable>(plan: &FixedRun, arrays: Arrays<T>, monitor: &mut dyn F
     workers::share(parts, &workers, monitor, worker(), || Ok(worker()), Worker::part)
 }
 
-/// Both slots, what the method keeps and the tally at the last check, and buffers for the carry, while the v slot holds velocities, and for recorded
-/// quantities.
+/// Both slots, what the method keeps and the tally at the last check, and buffers for the carry, while the v slot holds
+/// velocities, and for recorded quantities.
 #[derive(Default)]
 struct Good<T> {
     v: Vec<T>,

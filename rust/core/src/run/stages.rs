@@ -19,10 +19,11 @@ pub struct Stages {
     pub carries: bool,
     /// Whether attempts are those of a series.
     pub is_series: bool,
-    /// Each by its name: "step", and, where there is one, "start", "finish", "record", "begin", "judged", "by terms" and "extension".
+    /// Each by its name: "step", and, where there is one, "start", "finish", "record", "begin", "judged", "by terms" and
+    /// "extension".
     pub splits: Vec<(&'static str, Split)>,
-    /// Of attempts of float32, where their rows stand: numbers of the state, sampled inputs, results of the first part, and numbers
-    /// of the second before these.
+    /// Of attempts of float32, where their rows stand: numbers of the state, sampled inputs, results of the first part, and
+    /// numbers of the second before these.
     pub tried: Option<[usize; 4]>,
 }
 

@@ -1,4 +1,5 @@
-//! Waypoints: where a member stood when its accepted steps had doubled once more, from which its steps are examined after the run.
+//! Waypoints: where a member stood when its accepted steps had doubled once more, from which its steps are examined after the
+//! run.
 
 use super::{
     adaptive_plan::{Assignment, Part},
@@ -22,9 +23,9 @@ fn steps_to_next(accepted: f64) -> usize {
 
 /// Keeps where a lane stands if its member is at a waypoint, or a step before one.
 ///
-/// `rows` has for each waypoint the state before the step to it, the state after that, and the step-size control there, whose count
-/// of accepted steps is zero where there is none, and `ON_THE_WAY` from the first of both states on. The next waypoint but one
-/// takes the same rows.
+/// `rows` has for each waypoint the state before the step to it, the state after that, and the step-size control there, whose
+/// count of accepted steps is zero where there is none, and `ON_THE_WAY` from the first of both states on. The next waypoint but
+/// one takes the same rows.
 fn keep(rows: &mut Columns<f64>, group: &dyn AdaptiveBatch, lane: usize, member: usize, accepted: u64) {
     let (before, after) = ((accepted + 1).is_power_of_two(), accepted.is_power_of_two());
     let waypoint = if before { accepted + 1 } else { accepted };

@@ -268,8 +268,8 @@ impl<T: Steppable> World<T> {
     }
 
     /// A run of some steps from this start, both by rows of one number per member, and all states that it saves. Returns what
-    /// the method carries at the end, and keeps, or none if some number is not finite: then [`super::fixed::run`] finds whose, and
-    /// when.
+    /// the method carries at the end, and keeps, or none if some number is not finite: then [`super::fixed::run`] finds whose,
+    /// and when.
     pub fn run(&mut self, steps: RunSteps, start: [&[T]; 2], saved_v: &mut [T], saved_y: &mut [T]) -> Option<Vec<T>> {
         let RunSteps { first, steps, every } = steps;
         let (members, [v, y]) = (self.members, start);
@@ -448,8 +448,8 @@ impl<T: Steppable> World<T> {
 }
 
 impl World<f64> {
-    /// `n` steps with events, in place. `go_on` is asked now and then whether to; returns whether all were made. `between` is what is
-    /// known of the members since the last call.
+    /// `n` steps with events, in place. `go_on` is asked now and then whether to; returns whether all were made. `between` is
+    /// what is known of the members since the last call.
     pub fn step_and_look(
         &mut self,
         n: i64,

@@ -66,8 +66,8 @@ pub struct PreparedStage<T: Real = f64> {
     unrolled_pool_for: Option<KernelKind>,
 }
 
-/// Numbers of 64 bits for entries of a step of float32: what all members have in common, the same as a kernel wants it, times, and
-/// the values that entries are made of.
+/// Numbers of 64 bits for entries of a step of float32: what all members have in common, the same as a kernel wants it, times,
+/// and the values that entries are made of.
 #[derive(Default)]
 struct ClockNumbers {
     shared: Vec<f64>,

@@ -78,8 +78,8 @@ impl AttemptsOf<'_> {
         self.forced(Symbol::of(1.0), self.scaled(Symbol::of(1.0)))
     }
 
-    /// The system scaled to a step of 1, under its projection if there is one. Where time runs backward, a projection sees energies
-    /// and gradients of the system itself, scaled to a step of −1.
+    /// The system scaled to a step of 1, under its projection if there is one. Where time runs backward, a projection sees
+    /// energies and gradients of the system itself, scaled to a step of −1.
     fn projected(&self) -> Box<dyn System<Symbol>> {
         let h = Symbol::of(if self.backward { -1.0 } else { 1.0 });
         let under = around::wrap_without_forces(&parameters(self.signature, h), self.made(h), Symbol::of(0.0));
@@ -155,8 +155,8 @@ impl AttemptsOf<'_> {
         next
     }
 
-    /// The continuous extension of the next step, behind the state and the pace, which stay: its coefficients, how long the step is,
-    /// and whether a group changes too much in it.
+    /// The continuous extension of the next step, behind the state and the pace, which stay: its coefficients, how long the step
+    /// is, and whether a group changes too much in it.
     pub(crate) fn extension(&self, program: &Program) -> Vec<Id> {
         let ((v, y), (pace, scales)) = (self.state(), self.pace());
         let step = pace.reach().0 - pace.t;

@@ -38,9 +38,9 @@ macro_rules! numbers {
 
 numbers! {
     /// The time of a member and the state of its step-size controller. Steps do not depend on the saved times: a step that
-    /// passes the next of them is held, not taken, until the states within it are saved, by the continuous extension of the method.
-    /// The last of them, and all where there is no extension, are made by extra steps from the start of the held one. An extra
-    /// step whose error is not tolerated shows that the held one missed something: that one is then rejected.
+    /// passes the next of them is held, not taken, until the states within it are saved, by the continuous extension of the
+    /// method. The last of them, and all where there is no extension, are made by extra steps from the start of the held one. An
+    /// extra step whose error is not tolerated shows that the held one missed something: that one is then rejected.
     pub struct Pace {
         /// Its time.
         t,
@@ -160,7 +160,8 @@ impl Pace<f64> {
         Pace { t: after, wall, h, before, most: MAX_FACTOR, ..self }
     }
 
-    /// Where a member begins again at its time, with a first step that is to be chosen: see `begun_again` in `runs/engine/adaptive.py`.
+    /// Where a member begins again at its time, with a first step that is to be chosen: see `begun_again` in
+    /// `runs/engine/adaptive.py`.
     #[must_use]
     pub(crate) fn again(self) -> Self {
         let (t, wall, none) = (self.t, f64::INFINITY, 0.0);

@@ -34,12 +34,13 @@ pub(crate) const LEAST_PART: f64 = f64::from_bits((1023 - 512) << 52);
 /// Rates that are differences of larger numbers are wrong by the rounding of these, of which the controller knows nothing, and
 /// no step makes the error small beside a size that has become less than that. So the error of a group is rounding
 /// - where a shorter step fails, too, with an error that did not fall by the power 3/2 of the length (that of smooth rates falls
-///   by 3 and more), while the group changes by less than SLOW times the fourth root of the tolerance, so that it is no motion; or
-///   by PUSHES times its size and more, for a force that sets in where next to nothing is left looks alike. Where it is no such
-///   push it is at most ROUNDINGS times what is lost in the largest size so far: beside a pole errors do not fall either.
+///   by 3 and more), while the group changes by less than SLOW times the fourth root of the tolerance, so that it is no motion;
+///   or by PUSHES times its size and more, for a force that sets in where next to nothing is left looks alike. Where it is no
+///   such push it is at most ROUNDINGS times what is lost in the largest size so far: beside a pole errors do not fall either.
 ///   Not so with algebraic equations: what they are off by after a step is an error of the next one, however short;
-/// - where a group stands, its error being UNLIKE times its change, though that is HOLDS_DOWN of what is tolerated or more (but not
-///   more than is tolerated or known: at the limit of stability a deviation stands, too, and would grow with what is known of it);
+/// - where a group stands, its error being UNLIKE times its change, though that is HOLDS_DOWN of what is tolerated or more (but
+///   not more than is tolerated or known: at the limit of stability a deviation stands, too, and would grow with what is known of
+///   it);
 /// - where it is no more than ALIKE times what is known of it.
 ///
 /// From then on ROUNDED times such an error in the same time is tolerated, up to the tolerance of the largest size so far. That

@@ -80,8 +80,9 @@ pub(super) fn operations(signature: &Signature, how: &StepKind, shape: Shape) ->
             let evaluations = if order > 0 { order * (order + 1) / 2 } else { program.evaluations() };
             let mut solving = 0;
             if program.is_implicit() {
-                // Of a full matrix; where ẏ is v times a number, only v is solved for. A column of the Jacobian takes about as long
-                // as the rates. Elimination has two choices and two operations for each of n³/3 entries, a solution three for n².
+                // Of a full matrix; where ẏ is v times a number, only v is solved for. A column of the Jacobian takes about as
+                // long as the rates. Elimination has two choices and two operations for each of n³/3 entries, a solution three
+                // for n².
                 let n = if shape.v == shape.y { shape.v } else { shape.v + shape.y };
                 equations = rates * n;
                 solving = 4 * n * n * n / 3 + 3 * n * n * program.solutions();
@@ -124,8 +125,8 @@ fn of_method(how: &StepKind, holds: impl Fn(&Program) -> bool) -> Result<bool, E
     })
 }
 
-/// The most operations of a step that solves equations, or of these equations alone: to trace and compile so many takes some three
-/// seconds.
+/// The most operations of a step that solves equations, or of these equations alone: to trace and compile so many takes some
+/// three seconds.
 pub(super) const MAX_IMPLICIT_OPERATIONS: usize = 500_000;
 
 /// The most operations of a step that solves equations and is one tape, for however few steps, though it might be solved over

@@ -55,8 +55,9 @@ pub(crate) fn terms<N: Number>(
     coefficients(system, order, [pace.t, unit, unit], v, y)
 }
 
-/// One step by these coefficients, or one extra step, which leaves the pace as it is and whose state has to be put back. `rates` are those of a step of 1, by which the end of a step is checked; a step that is made once more
-/// needs neither them nor branches.
+/// One step by these coefficients, or one extra step, which leaves the pace as it is and whose state has to be put back. `rates`
+/// are those of a step of 1, by which the end of a step is checked; a step that is made once more needs neither them nor
+/// branches.
 #[allow(clippy::too_many_arguments, reason = "all that an attempt depends on")]
 pub(crate) fn attempt<N: Number>(
     (terms, branches): Known<N>,
@@ -155,8 +156,9 @@ pub(crate) fn share_of(length: f64, before: f64) -> f64 {
 /// So many states within a step are summed side by side.
 pub(crate) const SIDE: usize = 8;
 
-/// One number of the states that an attempt makes at parts of its step, of that many coefficients, at least two, each so far behind
-/// the one before; `low` is what rounding left out before. There are no closures, which would be compiled for the baseline.
+/// One number of the states that an attempt makes at parts of its step, of that many coefficients, at least two, each so far
+/// behind the one before; `low` is what rounding left out before. There are no closures, which would be compiled for the
+/// baseline.
 #[inline(always)]
 pub(crate) fn sums(
     (start, low): (f64, f64),
@@ -265,8 +267,8 @@ fn reach<N: Number>(
     let far = rough_exp2(N::choose(by_radius.below(by_error), by_radius, by_error)) * unit;
     let limited = N::choose(number(1.0).below(pace.most), pace.most, number(1.0));
     let most = N::choose(pace.most.below(number(MAX_FACTOR)), limited, number(MAX_GROWTH)) * pace.before;
-    // A defect may be rounding of rates that are differences of larger numbers, and a branch may end at zero, so both are compared
-    // with the largest sizes so far.
+    // A defect may be rounding of rates that are differences of larger numbers, and a branch may end at zero, so both are
+    // compared with the largest sizes so far.
     let so_far = scales.longest.iter().zip(&counts_as);
     let so_far: Vec<N> = so_far.map(|(size, now)| longer(N::choose(zero.below(pace.lasts), *size, zero), *now)).collect();
     let allowed = |(bound, size): (N, &N)| number(DEFECT * (p + 1.0)) * (bound + number(ROUNDING) * *size);

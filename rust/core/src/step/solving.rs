@@ -1,5 +1,5 @@
-//! The equations of an implicit step: what they take, and their numbers as a tape of their own, for systems whose step is too long
-//! for one.
+//! The equations of an implicit step: what they take, and their numbers as a tape of their own, for systems whose step is too
+//! long for one.
 
 use super::{
     attempts::AttemptsOf,

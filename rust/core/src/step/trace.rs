@@ -134,7 +134,8 @@ fn memory(signature: &Signature, method: &Method, shape: Shape) -> Block<Symbol>
     block(shape.v + shape.y + method.kept_numbers(shape), sampled::numbers(signature))
 }
 
-/// Traces the second part of an attempt of float32, onto a tape of float64 that may hold something already; and where its rows are.
+/// Traces the second part of an attempt of float32, onto a tape of float64 that may hold something already; and where its rows
+/// are.
 pub(super) fn trace_judged(tape: Tape, signature: &Signature, how: &StepKind) -> Result<(Tape, Vec<Id>, TriedRows), Error> {
     let shape = shape(signature, how)?;
     let StepKind::Attempts { name, acceptance, backward, .. } = how else { return Err(Error::NoEstimate) };
@@ -265,8 +266,8 @@ pub(crate) fn trace_record(tape: Tape, signature: &Signature, names: &[String]) 
     }))
 }
 
-/// Traces a part of a scene by its name, for comparisons: "step", "attempt", its second part "judged", its "extension", "begin", "start" and "finish" with the number of a
-/// way to start behind them, or "record" with a quantity behind it.
+/// Traces a part of a scene by its name, for comparisons: "step", "attempt", its second part "judged", its "extension", "begin",
+/// "start" and "finish" with the number of a way to start behind them, or "record" with a quantity behind it.
 pub fn trace(tape: Tape, signature: &Signature, how: &StepKind, what: &str) -> Result<(Tape, Vec<Id>), Error> {
     let (what, which) = what.split_once(' ').unwrap_or((what, ""));
     let unknown = || Error::Options { system: signature.system.clone(), options: format!("trace {what} {which}") };

@@ -34,7 +34,8 @@ pub struct Friction {
 pub enum On {
     /// Vectors of so many numbers each, one after the other: all of v.
     Vectors(usize),
-    /// One number of v at that place; of the others, by how much each changes where that one changes by 1, or nothing if none does.
+    /// One number of v at that place; of the others, by how much each changes where that one changes by 1, or nothing if none
+    /// does.
     One(usize, Vec<Id>),
 }
 

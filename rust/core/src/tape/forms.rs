@@ -1,8 +1,8 @@
 //! The first of what [`super::fuse::fuse`] does: a sine that is written in many operations is written in fewer fused ones.
 //!
 //! Without fused multiply-adds a sine takes the reduction by π/2 in four parts, and both sine and cosine of what remains. With
-//! them x − nπ is exact in one operation, and so is what a square or a sum loses: one polynomial on [−π/2, π/2] is enough, with an
-//! error below that of the longer form.
+//! them x − nπ is exact in one operation, and so is what a square or a sum loses: one polynomial on [−π/2, π/2] is enough, with
+//! an error below that of the longer form.
 //!
 //! A function is found by its operations, whatever their order, and replaced where it is of something that depends on the state
 //! and where nothing else reads a value within it. So sine and cosine of one angle stay as they are: together they cost little

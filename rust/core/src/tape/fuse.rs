@@ -1,9 +1,9 @@
 //! The second exact arithmetic: sums with a product in them become fused multiply-adds, which round once instead of twice.
 //!
 //! First functions get their quick forms (`forms.rs`), increments are multiplied last (`increments.rs`), quotients by numbers
-//! become products (`quotients.rs`), and sums of two products are taken apart (`terms.rs`). Then products are fused. The choice is
-//! made on the tape and not by a compiler, so it is the same on every machine. A product is
-//! fused into the sum or the difference of which it is a term if
+//! become products (`quotients.rs`), and sums of two products are taken apart (`terms.rs`). Then products are fused. The choice
+//! is made on the tape and not by a compiler, so it is the same on every machine. A product is fused into the sum or the
+//! difference of which it is a term if
 //!
 //! - nothing else reads it, so that it vanishes, and
 //! - it depends on the state. Values that depend on parameters and the time alone are computed once before the steps, or once a

@@ -157,8 +157,8 @@ impl Tape {
         }
     }
 
-    /// Writes an operation, with the operands of a sum or a product in order. Nothing is folded or left out: the reference does the
-    /// same.
+    /// Writes an operation, with the operands of a sum or a product in order. Nothing is folded or left out: the reference does
+    /// the same.
     fn put(&mut self, op: Op) -> Id {
         self.keep(match op {
             Op::Add(a, b) => Op::Add(a.min(b), a.max(b)),

@@ -167,11 +167,11 @@ struct Series {
     bounds: HashMap<Id, [f64; 2]>,
     /// Reciprocals of divisors, and of roots twice over, each computed once.
     reciprocals: HashMap<Id, Symbol>,
-    /// Whether a root that is zero, and what has an infinite slope in a divisor or a function, count as constant: there derivatives
-    /// are not finite, or nothing depends on them.
+    /// Whether a root that is zero, and what has an infinite slope in a divisor or a function, count as constant: there
+    /// derivatives are not finite, or nothing depends on them.
     ends: bool,
-    /// Whether coefficients of order k are divided by k. The rounding of its reciprocal would be in all of them alike, so that the
-    /// energy of a long motion goes to one side. In steps of fixed length, whose unit is 1, they are multiplied by it.
+    /// Whether coefficients of order k are divided by k. The rounding of its reciprocal would be in all of them alike, so that
+    /// the energy of a long motion goes to one side. In steps of fixed length, whose unit is 1, they are multiplied by it.
     divides: bool,
 }
 

@@ -273,8 +273,8 @@ pub struct Split {
     pub member: Body,
     /// Its state are the first entries of the table of the steps, a lane for each step; row 0 is the time.
     pub step: Body,
-    /// The same of the other entries of a step of float32: which sample holds, and what is made of the times of samples. It computes
-    /// in float64, for a time divided by an interval takes more digits than float32 has.
+    /// The same of the other entries of a step of float32: which sample holds, and what is made of the times of samples. It
+    /// computes in float64, for a time divided by an interval takes more digits than float32 has.
     pub clock: Body,
     /// What the entries are.
     pub entries: Vec<Entry>,

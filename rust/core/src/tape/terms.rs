@@ -1,11 +1,11 @@
 //! The third part of what [`super::fuse::fuse`] does before products are fused: two products that are added to a third value are
 //! added one by one.
 //!
-//! a + (p·q + r·s) is a product, a fused multiply-add and a sum. As (a + p·q) + r·s it is two fused multiply-adds, and the product
-//! that is known last has one operation after it in place of three. So it is written, unless a depends on the state and is of a
-//! higher rank than both products, and so known last itself. Each of the terms may have the other sign. Both products and their
-//! sum depend on the state and are read once; of two such sums the one of the higher rank is taken apart. The same in Python:
-//! `reference/tape/terms.py`.
+//! a + (p·q + r·s) is a product, a fused multiply-add and a sum. As (a + p·q) + r·s it is two fused multiply-adds, and the
+//! product that is known last has one operation after it in place of three. So it is written, unless a depends on the state and
+//! is of a higher rank than both products, and so known last itself. Each of the terms may have the other sign. Both products and
+//! their sum depend on the state and are read once; of two such sums the one of the higher rank is taken apart. The same in
+//! Python: `reference/tape/terms.py`.
 
 use super::{Id, Op, Tape, uses::UseCounts};
 

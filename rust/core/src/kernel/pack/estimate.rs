@@ -12,8 +12,8 @@ use crate::kernel::timing::{Timing, UNITS, Unit, timing};
 const ISSUED: usize = 6;
 /// Operations under way at once.
 const WINDOW: usize = 256;
-/// Steps that are gone through, and after how many of them the count begins; and the same of steps so long that hardly two of them
-/// are under way at once.
+/// Steps that are gone through, and after how many of them the count begins; and the same of steps so long that hardly two of
+/// them are under way at once.
 const STEPS: [usize; 2] = [6, 3];
 const LONG_STEPS: [usize; 2] = [3, 1];
 const LONG: usize = 2 * WINDOW;

@@ -27,7 +27,8 @@ const FEWEST_OPERATIONS: usize = 8;
 /// In longer steps less is tried, so that it does not take long, and nothing is made a second time: there are enough operations
 /// that do not wait for what is moved.
 const LONG_STEP_OPERATIONS: usize = 600;
-/// In steps of so many, such as those of a series, only the widest vectors are tried: each trial takes as long as thousands of steps.
+/// In steps of so many, such as those of a series, only the widest vectors are tried: each trial takes as long as thousands of
+/// steps.
 const VERY_LONG_STEP_OPERATIONS: usize = 5000;
 /// Steps longer than that are not looked at: it would take seconds. None is one tape, whose operations are
 /// estimated to be at most 100 000, and may be twice as many.

@@ -40,8 +40,8 @@ pub(crate) struct RowContacts {
     points: Vec<u32>,
     /// The slots before the step.
     before: [Aligned; 2],
-    /// The slots after the step, what the method keeps, and the velocities at both ends; used if it carries something other than v
-    /// or keeps anything.
+    /// The slots after the step, what the method keeps, and the velocities at both ends; used if it carries something other than
+    /// v or keeps anything.
     after: [Vec<f64>; 2],
     kept: Vec<f64>,
     velocities: [Vec<f64>; 2],

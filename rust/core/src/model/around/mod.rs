@@ -86,7 +86,8 @@ pub(crate) fn wrap_scaled<N: Number>(p: &Parameters<N>, system: Box<dyn System<N
     wrap_in(p, system, N::of(0.0), |part| part.attempts == Attempts::Scaled)
 }
 
-/// A system, as `wrap_scaled` returns it, with what is around it but forces, which attempts add to rates that are stretched already.
+/// A system, as `wrap_scaled` returns it, with what is around it but forces, which attempts add to rates that are stretched
+/// already.
 pub(crate) fn wrap_without_forces<N: Number>(p: &Parameters<N>, system: Box<dyn System<N>>, tally: N) -> Box<dyn System<N>> {
     wrap_in(p, system, tally, |part| part.attempts == Attempts::Other)
 }

@@ -1,8 +1,8 @@
 //! A sampled controller: every so many steps it reads the state and sets parameters of the system, which it holds in between.
 //!
-//! What it remembers stands behind the state, in this order: how many steps ago it read the state last; its own state; what it has
-//! computed and not put out yet, of each sample a number for each that it sets, the oldest first; and, where it puts something out
-//! between samples, what it holds. `reference/sampled.py` has the same.
+//! What it remembers stands behind the state, in this order: how many steps ago it read the state last; its own state; what it
+//! has computed and not put out yet, of each sample a number for each that it sets, the oldest first; and, where it puts
+//! something out between samples, what it holds. `reference/sampled.py` has the same.
 
 use super::part::{Attempts, Part};
 use crate::{

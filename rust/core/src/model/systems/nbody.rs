@@ -12,8 +12,8 @@
 //! computes them.
 //!
 //! Fused, every product of the forces that is added is rounded with its sum only: `r²` is a sum from ε² on, and a pull an
-//! addend of what a body gets. Newton's f is then made without a root and a quotient (`Law::pull`). What is recorded is rounded as
-//! without; what a method makes of the forces, too, unless that is asked for as of any tape.
+//! addend of what a body gets. Newton's f is then made without a root and a quotient (`Law::pull`). What is recorded is rounded
+//! as without; what a method makes of the forces, too, unless that is asked for as of any tape.
 //!
 //! Bodies without mass, if it is known which these are, attract no other: the rest move as if these were not there, and each of
 //! these as if it were alone with the rest, which pull it one after the other. No sum over bodies has a term of theirs.
@@ -31,7 +31,8 @@ use crate::{
 };
 
 /// What the core knows of it. Given: the word `force`; the whole number `dim`; `masses` and `strength`, G·m, of the bodies;
-/// `softening`, ε; the whole number `fused`, 1 if products are; the list `massless` of bodies without mass, in ascending order, if there are any.
+/// `softening`, ε; the whole number `fused`, 1 if products are; the list `massless` of bodies without mass, in ascending order,
+/// if there are any.
 pub const KIND: Kind = Kind { name: "nbody", shape, velocity_term: |_| None, quantities, controllable: true, operations, make };
 
 fn shape(signature: &Signature) -> Result<Shape, Error> {

@@ -81,8 +81,8 @@ impl<'a> Looks<'a> {
         }
     }
 
-    /// Where events change the state of a lane's member: its run is from a time until another, and begins in this state; without one it
-    /// goes on.
+    /// Where events change the state of a lane's member: its run is from a time until another, and begins in this state; without
+    /// one it goes on.
     pub(super) fn begin_course(&mut self, (lane, member): (usize, usize), [t, end]: [f64; 2], begins: Option<&Vec<f64>>) {
         if self.watch.changes() {
             let begin = if begins.is_some() { self.events.begin.at(member) } else { t };

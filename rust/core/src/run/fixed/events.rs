@@ -26,8 +26,8 @@ const MADE_AT_ONCE: [i64; 2] = [4, 256];
 const NOTICED_AT_FIRST: i64 = 16;
 const NOTICED_AT_ONCE: [i64; 2] = [4, 64];
 const NOTICED_OF_GROUP: i64 = 1 << 11;
-/// If more than one step for so many members would be repeated, half as many are made at a time; if less than a fourth of it, twice
-/// as many.
+/// If more than one step for so many members would be repeated, half as many are made at a time; if less than a fourth of it,
+/// twice as many.
 const FEWER_AGAIN: usize = 2;
 
 /// The quantities of a group while it is stepped.
@@ -159,8 +159,8 @@ impl<'w, 'a> Looks<'w, 'a> {
         }
     }
 
-    /// For members of a world, whose last call ended at step `k`: searches go on for those that stand where they stood. `state` are
-    /// v and y of all members, by rows; `begins` if there was no call before.
+    /// For members of a world, whose last call ended at step `k`: searches go on for those that stand where they stood. `state`
+    /// are v and y of all members, by rows; `begins` if there was no call before.
     pub(in crate::run) fn again(
         watch: &'w mut Watch<'a>,
         between: &mut Between,
@@ -361,8 +361,8 @@ impl Looks<'_, '_> {
         self.memories.iter().zip(&self.stops).any(|(memory, stop)| !memory.ended && stop.is_none())
     }
 
-    /// Makes steps with events that change states, of a world or a method that carries something else than v: all lanes go on from the
-    /// end of the first step in which one is changed, where what that one carries begins anew.
+    /// Makes steps with events that change states, of a world or a method that carries something else than v: all lanes go on
+    /// from the end of the first step in which one is changed, where what that one carries begins anew.
     fn advance_together<T: Real>(&mut self, on: &mut Stepped<T>, mut k: i64, until: i64) {
         let (h, (p, _)) = (on.h, on.rows());
         while k < until && self.goes_on() {
@@ -498,8 +498,8 @@ impl Looks<'_, '_> {
         true
     }
 
-    /// Looks for events in a step of a lane, the `row`-th after the `k`-th, and notes the state that they give its member. After `until`
-    /// steps it may be saved.
+    /// Looks for events in a step of a lane, the `row`-th after the `k`-th, and notes the state that they give its member. After
+    /// `until` steps it may be saved.
     fn look_at<T: Real>(
         &mut self,
         on: &mut Stepped<T>,
