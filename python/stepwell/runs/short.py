@@ -26,7 +26,6 @@ class ShortRun:
         system: the system of which it was prepared.
         request: the run as it was requested.
         numbers: those of that system.
-        others: what a step takes beside numbers.
         is_free: whether the run holds for other numbers, too.
     """
 
@@ -35,10 +34,10 @@ class ShortRun:
         self._series = request.plan.method.has_derivatives
         # Comparisons of the time with parameters end steps.
         self.is_free = system.structure() is not None and not request.system.switches_by_time
-        self.numbers, self.others = [], None  # type: list[Array], Any
+        self.numbers: list[Array] = []
         if self.is_free:
             known = system.for_state_shapes(request.v, request.y)
-            self.numbers, self.others = known.numbers_of_step(request.plan.batch, series=self._series)
+            self.numbers = known.numbers_of_step(request.plan.batch, series=self._series)
 
     def run(self, v: Any, y: Any) -> Run | None:
         """The run from this start; None if it is to be made as any other."""
@@ -51,9 +50,7 @@ class ShortRun:
         request = self.request
         if system is self.system:
             return self._made(v, y, request.system, self.numbers)
-        numbers, others = system.numbers_of_step(request.plan.batch, series=self._series)
-        if others != self.others:
-            return None
+        numbers = system.numbers_of_step(request.plan.batch, series=self._series)
         if request.plan.single and any(np.abs(each).max(initial=0.0) > checks.LARGEST_SINGLE for each in numbers):
             return None  # others say what is wrong with them
         return self._made(v, y, request.system.with_numbers_of(system, request.v, request.y), numbers)

@@ -269,14 +269,9 @@ class System(Immutable, ValueEquality, ABC):
         """
         return _contents(self, self.direct())
 
-    def numbers_of_step(self, batch: Shape, *, series: bool) -> tuple[list[Array], Any]:
-        """The arrays of numbers that a step takes, in the order of the core, and all else that it takes."""
-        values = [value for _, value in self.parameters(batch, series=series)]
-        others = [value for value in values if type(value) is not np.ndarray]
-        return (
-            [value for value in values if type(value) is np.ndarray],
-            [(*value[:2], value[2].tobytes()) if type(value) is tuple else value for value in others],
-        )
+    def numbers_of_step(self, batch: Shape, *, series: bool) -> list[Array]:
+        """The arrays of numbers that a step takes, in the order of the core; all else follows from the structure."""
+        return [value for _, value in self.parameters(batch, series=series) if type(value) is np.ndarray]
 
     def with_numbers_of(self, other: System, v: Array, y: Array) -> System:
         """Another system of the same structure, known for the shapes of this state, as this one is."""

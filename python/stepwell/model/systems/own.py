@@ -218,9 +218,9 @@ class OwnSystem(System):
             shapes.append(value.shape)
         return known, tuple(shapes), None if self.equations is None else (self.v_shape, self.y_shape)
 
-    def numbers_of_step(self, batch: Shape, *, series: bool) -> tuple[list[Array], Any]:
-        """Its parameters; what else a step takes follows from its structure."""
-        return list(self.parameters_given.values()), None
+    def numbers_of_step(self, batch: Shape, *, series: bool) -> list[Array]:
+        """Its parameters."""
+        return list(self.parameters_given.values())
 
     def with_numbers_of(self, other: System, v: Array, y: Array) -> OwnSystem:
         """Another system of the same structure, with the operations of this one."""
