@@ -760,9 +760,8 @@ def test_other_args_are_other_numbers_of_the_same_operations(monkeypatch: pytest
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         options: dict[str, Any] = {"method": "LSODA", "rtol": 1e-4}
-        counts = [sw.solve_ivp(relaxing, (0.0, 400.0), [2.0, 0.0], args=(mu,), **options).nfev for mu in (200.0, 1.0, 200.0, 1.0)]
-    assert counts[:2] == counts[2:]
-    assert counts[0] < counts[1]
+        counts = [sw.solve_ivp(relaxing, (0.0, 400.0), [2.0, 0.0], args=(mu,), **options).nfev for mu in (1.0, 200.0, 1.0)]
+    assert counts[0] == counts[2] > counts[1]
     for args in ((math.inf, 0.1, 3), (np.float64(2.0), np.array(0.5), 3)):  # what is no finite number stands as it is
         assert sw.solve_ivp(driven, (0.0, 0.5), [0.0, 0.0], args=args).status in (0, -1)
 
