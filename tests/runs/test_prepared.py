@@ -486,7 +486,13 @@ def test_other_numbers_are_checked_and_judged() -> None:
     def capped(t: Any, v: Any, y: Any, *, most: Any = 1.0) -> Any:
         return -np.minimum(y, most)
 
-    def compared(make: Any, numbers: Sequence[float], method: str, **arguments: Any) -> list[int]:
+    def turned(t: Any, y: Any, *, of: Any = 1.0) -> Any:
+        return np.array([-y[1], y[0]])
+
+    def length(y: Any, *, of: Any) -> Any:
+        return of * (y[0] * y[0] + y[1] * y[1])
+
+    def compared(make: Any, numbers: Sequence[Any], method: str, **arguments: Any) -> list[int]:
         """The numbers of warnings of runs, one after the other, that are those of calls that know nothing."""
         module._kept.clear()
         made = [with_warnings(lambda x=x: sw.integrate(make(x), method, **arguments)) for x in numbers]
@@ -503,6 +509,21 @@ def test_other_numbers_are_checked_and_judged() -> None:
     loose = short | {"tolerance": 0.3, "at": 60.0}
     springs = lambda x: sw.Oscillator(1.0, damping=x, form="physical")  # noqa: E731 (it is an argument)
     assert compared(springs, (0.5, 0.25, 0.0, 0.125, 0.0), "merson", **loose) == [0, 0, 1, 0, 1]
+    turning = sw.system(turned, order=1)
+    turning.invariant(length)
+    circle = loose | {"v": None, "y": np.array([1.0, 0.0])}
+    assert compared(lambda x: turning(of=x), (0.0, 0.0, 1.0), "merson", **circle) == [0, 0, 0]
+    module._kept.clear()
+    for _ in range(2):
+        sw.integrate(turning(of=0.0), "merson", **circle)
+    ((run,),) = [[each.run for each in module._kept.values()]]
+    arrays = [np.empty(shape) for shape in run.shapes]  # type: ignore[union-attr]
+    numbers = [turning(of=x).numbers_of_step((), series=False) for x in (0.0, 1.0, 0.0)]
+    # What it keeps is multiplied by the number: the core is certain that it has not changed only where that is zero.
+    assert [run.core.run(None, circle["y"], *arrays, each) for each in numbers] == [2, 1, 2]  # type: ignore[union-attr]
+    # The member that came last to its end comes first in the next run.
+    rates = (np.array([1.0, 6.0]), np.array([6.0, 1.0]))
+    assert compared(lambda x: pendulum(omega=x), 3 * rates, "taylor", **short) == [0] * 6
     steps: dict[str, Any] = {"v": 0.0, "y": 1.0, "dt": 0.1, "steps": 40}
     assert compared(sw.Oscillator, (1.0, 1.5, 30.0, 1.25, 31.0), "rk4", **steps) == [0, 0, 1, 0, 1]
     assert sw.Aircraft().structure() is None  # own equations with attributes beside their parameters
