@@ -718,7 +718,7 @@ def test_other_args_are_other_numbers_of_the_same_operations(monkeypatch: pytest
     def raised(t: Any, y: Any, power: Any) -> Any:
         return [-(y[0] ** power)]  # nor is this one: a product takes less time
 
-    def of_a_kind(t: Any, y: Any, rate: Any) -> Any:
+    def of_a_kind(t: Any, y: Any, rate: Any) -> Any:  # the same for either kind where the rate is −1
         return [rate * y[0] if isinstance(rate, float) else -y[0]]
 
     def relaxing(t: Any, y: Any, mu: Any) -> Any:
@@ -737,7 +737,7 @@ def test_other_args_are_other_numbers_of_the_same_operations(monkeypatch: pytest
         (driven, [(1.0, 0.1, 3), (2.0, 0.2, 3), (1.5, 0.0, 3), (1.0, 0.1, 3)], 1),
         (switched, [(0.5, 1.0), (0.25, 2.0), (0.75, 1.0)], 1), (relaxing, [(1.0,), (3.0,), (300.0,), (2.0,), (400.0,)], 1),
         (chosen, [(1.0,), (-1.0,), (2.0,)], 3), (raised, [(2.0,), (3.0,), (2.5,)], 3), (relaxing, [(math.pi,), (math.tau,)], 1),
-        (of_a_kind, [(1.0,), (-2.0,)], 2), (capturing, [(1.0,), (2.0,), (0.5, 0.25), (1.5, 0.5)], 2),
+        (of_a_kind, [(-1.0,), (2.0,), (1.0,)], 3), (capturing, [(1.0,), (2.0,), (0.5, 0.25), (1.5, 0.5)], 2),
     ]  # fmt: skip
     for fun, every, entries in cases:
         start = [1.0, 0.5][: 1 if fun in (switched, chosen, raised, of_a_kind, capturing) else 2]

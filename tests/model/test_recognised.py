@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import functools
+import gc
 import inspect
 import math
 import pickle
 import types
+import weakref
 from collections.abc import Callable
 from typing import Any
 
@@ -237,3 +239,14 @@ def test_numbers_are_told_apart_by_their_bits() -> None:
     assert len(set(identities)) == len(identities)
     assert of(math.nan) == of(math.nan)
     assert of(np.array([1.0, np.nan])) == of(np.array([1.0, np.nan]))
+
+
+def test_what_is_known_of_a_function_goes_with_it() -> None:
+    captured = np.float64(2.0)
+    functions = [lambda x: captured * x, lambda x: captured + x]
+    for each in functions:
+        recognised.identity(each)
+    gone = [weakref.ref(each) for each in functions]
+    del each, functions
+    gc.collect()
+    assert [each() for each in gone] == [None, None]

@@ -574,7 +574,16 @@ def test_a_function_that_reads_something_else_is_another_one(monkeypatch: pytest
         return 0.5 * v**2 + 0.5 * k * y**2
 
     run = sw.integrate(sprung(k=1.0), "rk4", v=0.0, y=1.0, dt=0.1, steps=3, record="energy")
-    assert run.recorded["energy"].shape == (1,)
+    kept = 0.5 * float(run.v[-1] ** 2 + run.y[-1] ** 2)
+    assert run.recorded["energy"][-1] == pytest.approx(kept)
+
+    def declared_again(v: Any, y: Any, *, k: Any) -> Any:
+        return v**2 + k * y**2
+
+    declared_again.__name__ = "energy"
+    sprung.invariant(declared_again)
+    run = sw.integrate(sprung(k=1.0), "rk4", v=0.0, y=1.0, dt=0.1, steps=3, record="energy")
+    assert run.recorded["energy"][-1] == pytest.approx(2.0 * kept)
 
 
 STRENGTH = [1.0]

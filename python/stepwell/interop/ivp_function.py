@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import math
 from collections.abc import Callable
 from contextlib import suppress
 from functools import partial
@@ -121,7 +122,7 @@ def known(fun: Any, args: tuple[Any, ...], size: int, vectorized: bool) -> Known
             if some:
                 continue
             raise TraceError(f"fun: {error}") from error
-        if some and (_raises_to(system) or not _agrees(system, reads)):
+        if some and (_raises_to(system) or not _agrees(system, reads, some)):
             continue
         break
     found = Known(reads, system, some, {})
@@ -183,16 +184,22 @@ def _raises_to(system: Any) -> bool:
     return any(mark.name == "power" and isinstance(mark.arguments[1], Symbol) for mark in marks.values())
 
 
-def _agrees(system: Any, reads: Reads) -> bool:
-    """True if rates are those of the function with its numbers: it may ask what kind of object these are."""
-    fun, args, size, vectorized = reads
-    for y in (np.linspace(0.5, 1.5, size), np.linspace(-1.25, 0.75, size)):
+def _agrees(system: Any, reads: Reads, numbers: Numbers) -> bool:
+    """True if rates are those of the function: it may ask what kind of objects its numbers are.
+
+    The numbers are others than those of the call, so that it follows from the function alone.
+    """
+    size = reads[2]
+    for shift, y in ((0.3, np.linspace(0.5, 1.5, size)), (-1.7, np.linspace(-1.25, 0.75, size))):
+        others = {place: shift + math.sqrt(2.0 + i) for i, place in enumerate(numbers)}
+        fun, args, _, vectorized = with_numbers(reads, others)
         with np.errstate(all="ignore"):
             try:
                 expected = np.asarray(fun(0.375, y[:, np.newaxis] if vectorized else y, *args), np.float64).reshape(-1)
             except Exception:  # whatever a function raises where it is not defined
                 return False
-            rates = np.broadcast_to(system.reference_at_step(1.0, ()).dy(0.375, np.zeros(0), y), (size,))
+            rates = system.with_arguments(named_parameters(others)).reference_at_step(1.0, ()).dy(0.375, np.zeros(0), y)
+            rates = np.broadcast_to(rates, (size,))
             if expected.shape != (size,) or not np.allclose(rates, expected, rtol=1e-9, atol=1e-12, equal_nan=True):
                 return False
     return True

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from typing import Any
 
 import numpy as np
@@ -19,7 +20,7 @@ from .result import Run
 NOT_MADE, TAME = 0, 2
 
 
-class ShortRun:
+class ShortRun(ABC):
     """A run of so few steps that all else takes longer, without its start and the numbers of its system.
 
     Attributes:
@@ -55,9 +56,9 @@ class ShortRun:
             return None  # others say what is wrong with them
         return self._made(v, y, request.system.with_numbers_of(system, request.v, request.y), numbers)
 
+    @abstractmethod
     def _made(self, v: Any, y: Any, system: System, numbers: list[Array] | None) -> Run | None:
         """``numbers`` are those of the system; None if the core has no others."""
-        raise NotImplementedError
 
     def _findings(self, run: Run, v: Any, y: Any, system: System) -> None:
         """Look for findings, which a short run rarely has."""

@@ -1,4 +1,4 @@
-"""Short runs of adaptive steps that differ in their start alone."""
+"""Short runs of adaptive steps."""
 
 from __future__ import annotations
 

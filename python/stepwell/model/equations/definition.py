@@ -37,9 +37,9 @@ class Known:
     def __init__(self, readings: list[Reading]) -> None:
         self.readings, self.by_shapes = readings, {}  # type: list[Reading], dict[Any, Any]
 
-    def holds(self, number: int) -> bool:
-        """True if these are the functions, so many, and they read the same objects."""
-        return len(self.readings) == number and all(map(Reading.holds, self.readings))
+    def holds(self, functions: list[Any]) -> bool:
+        """True if these are the functions, and they read the same objects."""
+        return len(self.readings) == len(functions) and all(map(Reading.holds, self.readings, functions))
 
 
 class Definition:
@@ -82,11 +82,11 @@ class Definition:
 
     def known(self) -> Known | None:
         """The cache of its functions, the same object as long as these compute the same; None if that cannot be seen."""
-        known = self._known
-        if known.holds(1 + len(self.invariants)):
+        known, functions = self._known, [self.function, *(each.function for each in self.invariants.values())]
+        if known.holds(functions):
             return known
         try:
-            readings = [reading(self.function), *(reading(each.function) for each in self.invariants.values())]
+            readings = [reading(each) for each in functions]
         except Unknown:
             return None
         if [each.identity for each in readings] == [each.identity for each in known.readings]:

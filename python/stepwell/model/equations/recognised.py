@@ -13,7 +13,7 @@ import math
 from functools import lru_cache, partial
 from types import BuiltinFunctionType, CellType, CodeType, FunctionType, ModuleType
 from typing import Any
-from weakref import WeakKeyDictionary
+from weakref import WeakKeyDictionary, ref
 
 import numpy as np
 
@@ -38,7 +38,8 @@ class Reading:
 
     def __init__(self) -> None:
         self.identity: Any = None
-        #: All functions among what is read, each with its code and its defaults.
+        #: The function; and all functions that are read while it is, each with its code and its defaults.
+        self.function: Any = None
         self.functions: list[FunctionType] = []
         self.defaults: list[tuple[CodeType, Any, Any]] = []
         #: Dictionaries with a name and the object under it, and captured variables with their objects.
@@ -47,18 +48,17 @@ class Reading:
         #: Whether none of the objects can be changed in place.
         self.is_fixed = True
 
-    def holds(self) -> bool:
-        """True if the function still reads the same objects, none of which can be changed in place."""
-        if not self.is_fixed:
+    def holds(self, function: Any) -> bool:
+        """True if it is of this function, which still reads the same objects, none of which can be changed in place."""
+        if not self.is_fixed or self.function is None or self.function() is not function:
             return False
         for names, name, value in self.names:
             if names.get(name, _MISSING) is not value:
                 return False
-        for function, known in zip(self.functions, self.defaults, strict=True):
-            code, defaults, keywords = known
-            if function.__code__ is not code or function.__defaults__ is not defaults or function.__kwdefaults__ is not keywords:
+        for each, (code, defaults, keywords) in zip((function, *self.functions), self.defaults, strict=True):
+            if each.__code__ is not code or each.__defaults__ is not defaults or each.__kwdefaults__ is not keywords:
                 return False
-            if function.__dict__:
+            if each.__dict__:
                 return False
         try:
             return all(cell.cell_contents is value for cell, value in self.cells)
@@ -69,7 +69,7 @@ class Reading:
 _MISSING = object()
 #: What functions read that were recognised before, and the most of them.
 _READ: WeakKeyDictionary[FunctionType, Reading] = WeakKeyDictionary()
-MOST_READ = 1024
+MOST_READ = 256
 
 
 def identity(function: Any) -> Any:
@@ -88,11 +88,13 @@ def reading(function: Any) -> Reading:
         Unknown: if something that the function reads may change unseen.
     """
     known = _READ.get(function) if type(function) is FunctionType else None
-    if known is not None and known.holds():
+    if known is not None and known.holds(function):
         return known
     anew = Reading()
     anew.identity = _of(function, anew)
     if type(function) is FunctionType:
+        # Known weakly, so that it can be forgotten when it is gone.
+        anew.function, anew.functions = ref(function), anew.functions[1:]
         if len(_READ) >= MOST_READ:
             _READ.clear()
         _READ[function] = anew
