@@ -1,4 +1,4 @@
-"""A new method is two files, a new system three: those of ``docs/developing/adding.md`` are tested in a copy of the tree."""
+"""Methods of two files, systems of three, options of one entry: those of ``docs/developing/adding.md``, in a copy of the tree."""
 
 import os
 import re
@@ -191,6 +191,36 @@ def test_it_is_the_spring_of_that_name(tree: Path) -> None:
         "    assert reference.y.tobytes() == runs[0].y.tobytes()\n"
         "    assert abs(runs[0].y[-1] - runs[1].y[-1]) < 1e-8\n"
         "    assert abs(runs[0].events['crossing'].t - runs[1].events['crossing'].t).max() < 1e-8\n"
+    )
+    run(tree, "-c", code)
+
+
+def test_it_is_the_option_of_that_name(tree: Path) -> None:
+    """In signature and documentation, checked, kept by short runs and by runs that go on, refused where it means nothing."""
+    code = (
+        "import inspect, stepwell as sw\n"
+        "assert 'label' in inspect.signature(sw.integrate).parameters and 'label: a name for the run' in sw.integrate.__doc__\n"
+        "assert 'label' not in inspect.signature(sw.World).parameters and 'label:' not in sw.World.__doc__\n"
+        "start, fixed, adaptive = {'v': 0.0, 'y': 1.0}, {'dt': 0.1, 'steps': 2}, {'tolerance': 1e-6, 'at': [1.0]}\n"
+        "for steps, more in ((fixed, {'steps': 2}), (adaptive, {'at': [2.0]})):\n"
+        "    run = [sw.integrate(sw.Oscillator(), 'dop853', **start, **steps, label='calm') for _ in range(4)][-1]\n"
+        "    plain = sw.integrate(sw.Oscillator(), 'dop853', **start, **steps)\n"
+        "    assert run.y.tobytes() == plain.y.tobytes() and 'calm' not in repr(plain)\n"
+        "    for one in (run, sw.integrate(sw.Oscillator(), 'dop853', resume=run, **more)):\n"
+        "        assert repr(one).startswith('<calm: run of Oscillator('), one\n"
+        "    prepared = sw.prepare(sw.Oscillator(), 'dop853', **start, **steps, label='calm')\n"
+        "    assert [repr(prepared(0.0, 2.0))[:6] for _ in range(3)] == 3 * ['<calm:']\n"
+        "def refused(call, **options):\n"
+        "    try:\n"
+        "        call(**options)\n"
+        "    except sw.StepwellError as error:\n"
+        "        return str(error)\n"
+        "oscillator = {'system': sw.Oscillator(), 'method': 'rk4', **start}\n"
+        "assert refused(sw.integrate, **oscillator, **fixed, label=3) == 'label: expected text of one line, got 3'\n"
+        "assert refused(sw.World, **oscillator, dt=0.1, label='a') == 'label: a world does not keep states; integrate does'\n"
+        "axes = {'y': ('y', [1.0, 2.0])}\n"
+        "swept = refused(sw.sweep, system=sw.Oscillator(), axes=axes, method='rk4', v=0.0, **fixed, label='a')\n"
+        "assert swept == 'label: a sweep names its results by units='\n"
     )
     run(tree, "-c", code)
 

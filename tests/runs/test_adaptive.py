@@ -308,7 +308,7 @@ WRONG: list[tuple[dict[str, Any], type[Exception], str]] = [
     ({"at": [-1.0, 1.0]}, ArgumentError, "ascend from t0 = 0"),
     ({"at": []}, ArgumentError, "at: expected times along the first axis"),
     ({"steps": 3}, ArgumentError, "steps: works with fixed steps only"),
-    ({"start": "first_order", "form": "matrix"}, ArgumentError, "start, form: works with fixed steps only"),
+    ({"start": "first_order", "form": "matrix"}, ArgumentError, "form, start: works with fixed steps only"),
     ({"max_steps": 0}, ArgumentError, "max_steps: expected 1 or more"),
     ({"dt": -1.0}, ArgumentError, "dt: expected a step above zero"),
     ({"tolerance": np.ones(3), "y": np.ones(2)}, ArgumentError, "do not broadcast"),

@@ -201,7 +201,6 @@ def test_errors_are_those_of_integrate() -> None:
     with pytest.raises(sw.errors.ArgumentError, match=r"positive: expected a start at which y\[2\] is not negative"):
         positive(None, [1.0, 1.0, -1.0])
     wrong: list[tuple[dict[str, Any], str]] = [
-        ({"step": 5}, "prepare: expected arguments of integrate, got step="),
         ({"resume": whole(system, "rk4", v=0.0, y=1.0, **arguments)}, "resume: a prepared run begins at the start of its call"),
         ({"steps": 0, "v": 0.0, "y": 1.0}, "steps"),
     ]

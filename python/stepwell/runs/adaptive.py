@@ -16,7 +16,7 @@ from .result import AdaptiveState, Paces, Run
 def adaptive_run(request: Request, waypoints: list[Array] | None = None) -> Run:
     """Make the run, without its diagnostics. Where its members stood on the way is added to ``waypoints``, if it is known."""
     assert request.step_control is not None
-    plan, (pacing, paces, _, times, _, every, start), method = request.plan, request.step_control, request.plan.method
+    plan, (pacing, paces, _, times, every, start), method = request.plan, request.step_control, request.plan.method
     adapt: Any = engine.adapt
     with_events, keeper = None, None
     if waypoints is not None:
@@ -59,7 +59,7 @@ def adaptive_run(request: Request, waypoints: list[Array] | None = None) -> Run:
 def run_of(request: Request, out: engine.Adapted, t: Array, v: Array, y: Array) -> Run:
     """The run of what the engine made, with these states saved at these times."""
     assert request.step_control is not None
-    plan, (pacing, _, t0, times, going_on, _, _), method = request.plan, request.step_control, request.plan.method
+    plan, (pacing, _, t0, times, _, _), method = request.plan, request.step_control, request.plan.method
     of_extra = of_extra_steps(plan, out.evaluations, dense=len(pacing.at) > 1 or not pacing.begins)
     counted, stopped = paces_of(plan, out.paces, out.evaluations, of_extra), np.count_nonzero(out.status) > 0
     control = request.system.control
@@ -78,9 +78,8 @@ def run_of(request: Request, out: engine.Adapted, t: Array, v: Array, y: Array) 
         steps=0,
         start=None,
         paces=counted,
-        controller_state=AdaptiveState(
-            out.last_v, out.last_y, _with_target(out.paces, pacing.at[-1]), times[-1], method.name, going_on
-        ),
+        controller_state=AdaptiveState(out.last_v, out.last_y, _with_target(out.paces, pacing.at[-1]), times[-1], method.name),
+        options=request.going_on,
         fused=plan.fused,
         force=plan.force,
         work=None if control is None else out.paces[engine.WORK] / engine.pushes(control, method.attempt_evaluations),

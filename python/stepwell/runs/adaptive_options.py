@@ -16,7 +16,8 @@ from ..model.methods import methods as every_method
 from ..model.systems import System
 from ..reference.acceptance import Acceptance
 from . import continuation, engine
-from .options import Options, spread
+from .options import Options
+from .options.parts import spread
 from .result import AdaptiveState
 
 if TYPE_CHECKING:
@@ -24,18 +25,12 @@ if TYPE_CHECKING:
 
 
 def check_adaptive(options: Options, before: Continuation | None) -> None:
-    """Raise if an option works with fixed steps only, or if ``tolerance`` or ``at`` is missing."""
+    """Raise if the run that goes on has fixed steps, or if ``tolerance`` or ``at`` is missing."""
     if before is not None and not before.adaptive:
         raise ArgumentError(
             "resume: expected a run with adaptive steps, since tolerance= or at= was given, got one with fixed steps; start anew "
             "from its last state: v=run.v[-1], y=run.y[-1], t0=run.t[-1]"
         )
-    fixed = {name: getattr(options, name) for name in ("steps", "start", "start_step")}
-    if not isinstance(options.form, str) or options.form != "direct":
-        fixed["form"] = options.form
-    if wrong := [name for name, value in fixed.items() if value is not None]:
-        why = "and the run that goes on has adaptive steps" if before is not None else "and tolerance= or at= was given"
-        raise ArgumentError(f"{', '.join(wrong)}: works with fixed steps only, {why}")
     check_times(options.tolerance is not None or before is not None, options.at)
 
 
@@ -126,7 +121,7 @@ def jump_times(system: System, jumps: Any, t0: Array, times: Array) -> Array | N
         begin, end = min(float(times.min()), float(t0.min())), max(float(times.max()), float(t0.max()))
         parts.append(system.switching_times(begin, end))
     if jumps is not None:
-        parts.append(np.atleast_1d(checks.numbers("jumps", jumps, unit="units of time")))
+        parts.append(jumps)
     if not any(len(part) for part in parts):
         return None
     together = checks.concatenated(parts)

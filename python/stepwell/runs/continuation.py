@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from itertools import zip_longest
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
@@ -79,6 +79,12 @@ class Continuation(NamedTuple):
         return all(a == b for a, b in zip_longest(one, other))
 
 
+class Standing(Protocol):
+    """A ``World``, as far as a run that goes on from it needs it."""
+
+    def _standing(self) -> Continuation: ...
+
+
 def of(resume: Any, *, stopped: bool = False) -> Continuation:
     """Where a run or a world stands, from which another goes on; also of members that an event stopped, if ``stopped``.
 
@@ -113,12 +119,13 @@ def _of_run(run: Run, goes_on_stopped: bool) -> Continuation:
     v, y = (np.require(each, requirements="A") for each in (run.v[-1], run.y[-1]))
     carry = None if run.carry is None else np.require(run.carry, requirements="A")
     options = {"fused": run.fused, "dtype": run.dtype, "control": run.system.keeper, "force": run.force, "t0": run.t0}
+    options |= run.options
     if (state := run.controller_state) is not None:
         # Members that stopped have no state at the last time; theirs is that of the stop.
         there = is_there(state.pace)
         state = state._replace(**{name: np.require(getattr(state, name), requirements="A") for name in ("v", "y", "pace")})
         v, y = (np.where(there, saved, last) for saved, last in ((v, state.v), (y, state.y)))
-        return Continuation(run.system, run.method, v, y, options | state.options, state, None, run.changed_by, adaptive=True)
+        return Continuation(run.system, run.method, v, y, options, state, None, run.changed_by, adaptive=True)
     options |= {"start_step": run.start_step + run.steps, "dt": run.dt, "start": run.start}
     bad = run.first_bad_step if run.status.any() else None
     carry, memory = _parted(run.system, run.method, run.dt, carry)

@@ -20,9 +20,9 @@ from ..model.parameters import aligned
 from ..model.systems import NBody, System
 from . import encounters, engine, known_energy
 from .findings import Finding, may_have_amounts
+from .options.tolerance import MAX_ABSOLUTE_SHARE, lost_in_tolerance
 from .request import Request
 from .result import Run, Status
-from .tolerance import MAX_ABSOLUTE_SHARE, lost_in_tolerance
 
 #: A member's energy is doubtful where it changed by more than this share of its own size and of the kinetic energy.
 DOUBTFUL_CHANGE = 0.5

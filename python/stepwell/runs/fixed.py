@@ -59,6 +59,7 @@ def fixed_run(request: Request) -> Run:
         recorded=out.recorded,
         work=out.work,
         force=plan.force,
+        options=request.going_on,
     )
     if with_events is not None:
         with_events.write_to(run)

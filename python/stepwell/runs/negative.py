@@ -23,7 +23,7 @@ from ..reference import adaptive
 from . import engine
 from .events.members import Members
 from .findings import Finding, at_places, may_have_amounts
-from .positive import name_of
+from .options.positive import name_of
 from .result import Run
 
 #: Errors of many steps add up to so many times the tolerated one of a step, but to no more than this part of a size.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -13,11 +13,17 @@ from ..model.methods import Method
 from ..model.systems import System
 from .findings import is_heard, warn_of
 from .making import noticing
-from .options import Options, spread
+from .options import Options, named
+from .options.parts import spread
 from .request import Request
 from .result import Run
 from .short import ShortRun
 from .short_runs import fixed_options, is_free, is_small, short_run_of_request
+
+if TYPE_CHECKING:
+    from typing import Unpack
+
+    from .options.table import RunOptions
 
 
 class PreparedRun:
@@ -86,7 +92,7 @@ class PreparedRun:
         return request
 
 
-def prepare(system: System, method: str | Method, *, v: Any = None, y: Any = None, **options: Any) -> PreparedRun:
+def prepare(system: System, method: str | Method, **options: Unpack[RunOptions]) -> PreparedRun:
     """Check and prepare a run once, to make it from many starts: ``prepare(…)(v, y)`` is ``integrate(…)`` in less time.
 
     The call takes a few microseconds beside the steps for short runs of fixed steps in the direct form, and of some hundred
@@ -98,10 +104,7 @@ def prepare(system: System, method: str | Method, *, v: Any = None, y: Any = Non
     Args:
         system: the system to step.
         method: its name, or what ``stepwell.method`` returns.
-        v: velocity block of a start like those to come, shape (*block, *batch), or one number for all; a first-order system has
-            none.
-        y: coordinate block, likewise.
-        **options: all others of ``integrate``, but ``resume``.
+        **options: those of ``integrate``, but ``resume``. ``v`` and ``y`` are a start like those to come.
 
     Returns:
         A ``PreparedRun``. Starts of another shape are taken too, and prepared anew.
@@ -116,12 +119,11 @@ def prepare(system: System, method: str | Method, *, v: Any = None, y: Any = Non
         >>> [float(swing(v, 0.0).y[-1].round(6)) for v in (0.5, 1.0, 2.0)]
         [0.454649, 0.909298, 1.818596]
     """
-    if unknown := [name for name in options if name not in Options._fields]:
-        raise ArgumentError(f"prepare: expected arguments of integrate, got {unknown[0]}=")
-    if options.get("resume") is not None:
+    asked = named("prepare", options)
+    if asked.resume is not None:
         raise ArgumentError("resume: a prepared run begins at the start of its call; to go on with a run use integrate")
-    prepared = PreparedRun(system, method, Options(**options))
-    prepared.request(v, y)
+    prepared = PreparedRun(system, method, asked._replace(v=None, y=None))
+    prepared.request(asked.v, asked.y)
     return prepared
 
 

@@ -27,30 +27,24 @@ from ..model.compatibility import (
     samples_meet_steps,
     velocities,
 )
-from ..model.controls import a_control
 from ..model.methods import Method, of_operations
 from ..model.systems import System
 from ..model.systems.base import TINY, a_system
 from ..reference.acceptance import Acceptance
 from . import continuation, engine
-from .options import (
-    BACKENDS,
-    Options,
-    arithmetic,
+from .options import Options
+from .options.checked import Checked, refuse
+from .options.parts import (
     check_algebraic,
     check_matrix_form,
     checked_system,
     controlled,
-    event_list,
-    known_form,
     last_time,
-    machine_of,
     options_of_resumed,
-    quantities,
     spread,
     under_control,
 )
-from .tolerance import order_of_series, tolerances_of
+from .options.tolerance import order_of_series, tolerances_of
 
 if TYPE_CHECKING:
     from .continuation import Continuation
@@ -59,9 +53,6 @@ if TYPE_CHECKING:
 #: The memory of a run besides its saved states: NUMBERS_PER_STATE for each number of a state (the start, the carry, the final
 #: state), and BYTES_PER_TIME for each saved time (its step number and the time).
 NUMBERS_PER_STATE, BYTES_PER_TIME = 4, 16
-
-#: Default of ``max_steps``: the most steps of a member of a run with a tolerance.
-MOST_STEPS = 1_000_000
 
 
 class StepControl(NamedTuple):
@@ -72,7 +63,6 @@ class StepControl(NamedTuple):
         paces: the step-size controllers before the first step.
         t0: the time of the start, of all members or of each.
         times: those at which states are saved, in the direction of the run.
-        going_on: the options that hold for a run that goes on, too: ``max_step``, ``jumps``, ``positive``.
         every: the accepted steps from one saved state to the next; None if no steps are saved.
         start: the times, in the direction of the plan, and the states from which members go on.
     """
@@ -81,7 +71,6 @@ class StepControl(NamedTuple):
     paces: Array
     t0: Array
     times: Array
-    going_on: dict[str, Any]
     every: int | None
     start: tuple[Array, Array, Array]
 
@@ -102,6 +91,7 @@ class Request(NamedTuple):
         progress: whether a bar is shown.
         slot: for a world, what the method carries besides ``v``.
         step_control: what adaptive steps need; None with fixed steps.
+        options: all options, as they were checked; None for a step.
     """
 
     plan: engine.Plan
@@ -116,6 +106,12 @@ class Request(NamedTuple):
     progress: bool = False
     slot: Array | None = None
     step_control: StepControl | None = None
+    options: Checked | None = None
+
+    @property
+    def going_on(self) -> dict[str, Any]:
+        """The options that hold for a run that goes on, too."""
+        return {} if self.options is None else self.options.going_on()
 
     @classmethod
     def of(cls, system: System, method: str | Method, options: Options) -> Request:
@@ -130,76 +126,42 @@ class Request(NamedTuple):
     @classmethod
     def fixed(cls, system: System, method: str | Method, options: Options, before: Continuation | None = None) -> Request:
         """A run with steps of one length."""
-        (
-            v, y, dt, steps, every, _, _, control, force, record, events, form, fused, dtype, t0, start, max_steps, max_step,
-            jumps, positive_components, progress, threads, backend, device, start_step, _,
-        ) = options  # fmt: skip
-        method, system, v = checked_system(system, method, v, y)
-        fused, single = arithmetic(fused, dtype)
+        method, system, v = checked_system(system, method, options.v, options.y)
+        asked = Checked(options._replace(v=v), None, system=system, method=method, before=before)
         if before is not None:
-            continuation.changes_on(before, events)
-        if max_steps is not None:
-            raise ArgumentError("max_steps: works with tolerance= and at= only; steps= is the number of steps of fixed length")
-        if max_step is not None or jumps is not None or positive_components is not None:
-            adaptive_only = (("max_step", max_step), ("jumps", jumps), ("positive", positive_components))
-            name = next(name for name, option in adaptive_only if option is not None)
-            raise ArgumentError(f"{name}: works with tolerance= and at= only; all steps of fixed length are dt long")
-        if dt is None or steps is None:
-            missing = " and ".join(name for name, value in (("dt", dt), ("steps", steps)) if value is None)
-            raise ArgumentError(f"{missing}: needed for fixed steps, got None; for adaptive steps give tolerance= and at=")
-        form = known_form(form)
+            continuation.changes_on(before, options.events)
+        if missing := [name for name in ("dt", "steps") if not asked.given(name)]:
+            raise ArgumentError(
+                f"{' and '.join(missing)}: needed for fixed steps, got None; for adaptive steps give tolerance= and at="
+            )
+        form, control, single, dt = asked["form"], asked["control"], asked["dtype"], asked["dt"]
         if method.is_exact and form == "direct":
             form = "matrix"  # which its steps are
-            not_with_exact(method, force=force, events=events, control=control)
-        backend = checks.known("backend", backend, BACKENDS)
-        machine = machine_of(device, backend)
+            not_with_exact(method, force=options.force, events=options.events, control=control)
         if form != "direct":
-            check_matrix_form(system, method, form, force)
-        watched = None if events is None else event_list(events, form)
-        control = a_control(control)
-        dt = checks.step(dt)
-        if single:
-            from . import float32  # only such runs need it
-
-            dt = float32.step(system, method, dt)
+            check_matrix_form(system, method, form, options.force)
+        watched = asked["events"]
         if before is not None:
             continuation.goes_on_alike(before, method, dt)
-        t0 = 0.0 if t0 is None else checks.beginning(t0)
-        steps = checks.count("steps", steps, 1)
-        start_step = 0 if start_step is None else checks.count("start_step", start_step, 0, checks.LAST_STEP - steps)
+        t0, steps, every, start_step = asked["t0"], asked["steps"], asked["every"], asked["start_step"]
         last = last_time(t0, dt, start_step, steps)
         system.check_time(last)
         if single:
+            from . import float32  # only such runs need it
+
             float32.check_inputs(system, last)
         if dt < 0.0:
             goes_back(system, control)
-        every = None if every is None else checks.count("every", every, 1)
-        record = quantities(system, record)
-        workers = 0 if threads is None else checks.count("threads", threads, 1, 4096)
-        choice = method.start_choice(start)
-
-        bad = None if before is None else before.first_bad_step
-        v = checks.block("v", v, system.v_shape, system.axes, finite=bad is None)
-        y = checks.block("y", y, system.y_shape, system.axes, finite=bad is None)
-        batches = {"system": system.batch, "v": v.shape[len(system.v_shape) :], "y": y.shape[len(system.y_shape) :]}
-        if control is not None:
-            batches["control"] = control.batch
+        record, v, y, force = asked["record"], asked["v"], asked["y"], asked["force"]
         if isinstance(t0, np.ndarray):
-            batches["t0"] = np.shape(t0)
             fits_own_times(system, single)
-        if force is not None:
-            forced(system)
-            force = checks.block("force", force, system.v_shape, system.axes)
-            batches["force"] = force.shape[len(system.v_shape) :]
-        batch = checks.batch_shape(batches)
+        of_plan = asked.of_plan()
+        batch = checks.batch_shape(asked.batches())
         rows = prod(system.v_shape) + prod(system.y_shape)
         if isinstance(t0, np.ndarray):
             t0 = spread(t0, (), batch)
             rows += 1  # the times, which are each member's own
-        plan = engine.Plan(
-            system, method, batch, dt, t0, start_step, steps, every, choice, workers, backend, form, fused=fused, single=single,
-            device=machine,
-        )  # fmt: skip
+        plan = engine.Plan(system, method, batch, dt, t0, steps=steps, every=every, form=form, **of_plan)
         # In float32, in the matrix forms and with events quantities are computed from the saved states, which do not tell what a
         # controller has put out.
         shapes, later = system.recorded_shapes(), form != "direct" or single or watched is not None
@@ -230,6 +192,7 @@ class Request(NamedTuple):
         if before is not None and before.carry is not None and (carried := before.holds(system, batch, v, y)):
             of_slot = (plan.slot_numbers,) if method.kept else system.v_shape
             v = spread(np.asarray(before.carry, np.float64), of_slot, batch)
+        bad = None if before is None else before.first_bad_step
         if bad is not None:
             bad = checks.diverged_before(bad, v, y, batch)
         if force is not None:
@@ -237,38 +200,33 @@ class Request(NamedTuple):
         if record or stepped is not plan.system:
             plan = plan._replace(system=stepped, record=while_stepping)
         if stepped.controller is not None:
-            goes_with_a_controller(stepped, method, events=events)
+            goes_with_a_controller(stepped, method, events=options.events)
             plan = plan._replace(memory=_memory(stepped, batch, before))
-        started = method.starts[choice] if method.starts else None
-        return cls(plan, system, v, y, carried, bad, record, watched, started, checks.flag("progress", progress))
+        started = method.starts[plan.choice] if method.starts else None
+        return cls(plan, system, v, y, carried, bad, record, watched, started, asked["progress"], options=asked)
 
     @classmethod
     def adaptive(cls, system: System, method: str | Method, options: Options, before: Continuation | None = None) -> Request:
         """A run in which every member has steps of its own."""
-        from . import adaptive_options, positive  # only such runs need them
+        from . import adaptive_options  # only such runs need them
+        from .options import positive
 
         method, system, v = checked_system(system, method, options.v, options.y)
-        fused, single = arithmetic(options.fused, options.dtype)
         if before is not None:
             continuation.changes_on(before, options.events)
         goes_with_a_controller(system, method, tolerance=True)
+        because = "tolerance= or at= was given" if before is None else "the run that goes on has adaptive steps"
         adaptive_options.check_adaptive(options, before)
-        watched = None if options.events is None else event_list(options.events, "direct")
-        control = a_control(options.control)
+        asked = Checked(options._replace(v=v), f"and {because}", system=system, method=method, before=before)
+        control, single, y = asked["control"], asked["dtype"], asked["y"]
         adaptive_options.check_estimates(system, method, control, options, before)
         if single:
             from . import float32  # only such runs need it
 
             float32.check(system, method)
-        t0 = checks.numbers("t0", 0.0 if options.t0 is None else options.t0, unit="units of time")
-        times = np.atleast_1d(checks.numbers("at", options.at, unit="units of time"))
-        if times.size == 0:
-            raise ShapeError(f"at: expected times along the first axis, got shape {times.shape}")
-        v = checks.block("v", v, system.v_shape, system.axes)
-        y = checks.block("y", options.y, system.y_shape, system.axes)
-        batches = {"system": system.batch, "v": v.shape[len(system.v_shape) :], "y": y.shape[len(system.y_shape) :]}
-        batches |= {"t0": t0.shape, "at": times.shape[1:]}
-        checks.batch_shape(batches)  # before t0 and at are compared
+        t0, times, v, force = np.asarray(asked["t0"]), asked["at"], asked["v"], asked["force"]
+        batches = asked.batches()
+        checks.batch_shape({name: batches.get(name, ()) for name in ("system", "v", "y", "t0", "at")})  # which are compared next
         backward = adaptive_options.is_backward(times, t0)
         acting = system.keeper if control is None else control
         if backward and acting is not None and getattr(acting, "acts_on_rates", True):
@@ -277,44 +235,28 @@ class Request(NamedTuple):
                 f"use a projection"
             )
         sign = -1.0 if backward else 1.0
-        backend = checks.known("backend", options.backend, BACKENDS)
-        budget = MOST_STEPS if options.max_steps is None else checks.count("max_steps", options.max_steps, 1)
-        machine = machine_of(options.device, backend)
-        places = positive.checked_places(system, options.positive, v, y)
+        of_plan = asked.of_plan()
+        places = positive.checked_places(system, asked["positive"], v, y)
         acceptance = Acceptance(system.groups, positive=places, compensated=method.has_series)
         numbers = prod(system.v_shape) + prod(system.y_shape)
         low = method.has_series * numbers
         groups = sum(acceptance.counts(prod(system.v_shape), prod(system.y_shape)))
-        pace = None
+        pace, first, most_step, budget = None, asked["dt"], asked["max_step"], asked["max_steps"]
         if before is not None:
             pace = adaptive_options.pace_of(before, method, groups, low)
             acceptance = acceptance._replace(own=len(engine.own_tolerances(pace, groups, low)) > 0)
-        first = most_step = None
-        if pace is not None:
-            if options.dt is not None:
+            if first is not None:
                 raise ArgumentError("dt: the run that goes on has its next step already")
             batches["resume"] = pace.shape[1:]
-        elif options.dt is not None:
-            first = checks.numbers("dt", options.dt, unit="units of time")
+        elif first is not None:
             if (sign * first <= 0.0).any():
                 raise ArgumentError(
                     f"dt: expected a step {'below' if backward else 'above'} zero, as at= goes, got {checks.short(options.dt)}"
                 )
             first = sign * first
-            batches["dt"] = first.shape
-        if options.max_step is not None:
-            most_step = checks.numbers("max_step", options.max_step, positive=True, unit="units of time")
-            batches["max_step"] = most_step.shape
-        jumps = adaptive_options.jump_times(system, options.jumps, t0, times)
+        jumps = adaptive_options.jump_times(system, asked["jumps"], t0, times)
         if jumps is not None:
             batches["jumps"] = jumps.shape[1:]
-        if control is not None:
-            batches |= {"control": control.batch}
-        force = options.force
-        if force is not None:
-            forced(system)
-            force = checks.block("force", force, system.v_shape, system.axes)
-            batches["force"] = force.shape[len(system.v_shape) :]
         tolerances = None
         if pace is None:
             tolerances = tolerances_of(options.tolerance, system, acceptance, checks.batch_shape(batches))
@@ -331,13 +273,11 @@ class Request(NamedTuple):
                 system.check_time(float(np.abs(end).max()))
                 if single:
                     float32.check_inputs(system, float(np.abs(end).max()))
-        every = None if options.every is None else checks.count("every", options.every, 1)
+        every, record = asked["every"], asked["record"]
         if every is not None and len(times) > 1:
             raise ShapeError(
                 f"at: with every= expected one time, that of the end, got {len(times)}; the states between are those of the steps"
             )
-        record = quantities(system, options.record)
-        workers = 0 if options.threads is None else checks.count("threads", options.threads, 1, 4096)
         checks.fits(
             "the saved states",
             len(times) * numbers + (NUMBERS_PER_STATE + 3) * (numbers + 1),
@@ -365,7 +305,6 @@ class Request(NamedTuple):
 
                 lengths = sizes(v, y, (len(system.v_shape), len(system.y_shape)), acceptance.groups)
                 float32.check_tolerance(tolerances.relative, tolerances.absolute, lengths)
-        progress = checks.flag("progress", options.progress)
         if tolerances is not None:
             check_algebraic(system, y, t0, tolerances)
         if control is not None:
@@ -376,9 +315,8 @@ class Request(NamedTuple):
         order = order_of_series(method, relative.min(axis=0) if acceptance.own else relative)
         begin: Any = sign * t0 if t0.ndim else float(sign * t0)
         plan = engine.Plan(
-            system, method, batch, 1.0, begin, threads=workers, backend=backend, fused=fused, order=order, acceptance=acceptance,
-            backward=backward, force=None if force is None else spread(force, system.v_shape, batch), single=single,
-            device=machine,
+            system, method, batch, 1.0, begin, order=order, acceptance=acceptance, backward=backward,
+            force=None if force is None else spread(force, system.v_shape, batch), **of_plan,
         )  # fmt: skip
         at = np.ascontiguousarray(sign * times)
         pacing = engine.Pacing(at, budget, pace is None, None if jumps is None else np.sort(sign * jumps, axis=0))
@@ -391,10 +329,11 @@ class Request(NamedTuple):
             pacing = pacing._replace(begins=begins)
             if most_step is not None:
                 paces[engine.MOST_STEP] = most_step
-        going_on = {"max_step": options.max_step, "jumps": options.jumps, "positive": options.positive}
-        going_on = {name: each for name, each in going_on.items() if each is not None}
-        step_control = StepControl(pacing, paces, t0, times, going_on, every, standing)
-        return cls(plan, system, v, y, not pacing.begins, None, record, watched, progress=progress, step_control=step_control)
+        step_control = StepControl(pacing, paces, t0, times, every, standing)
+        return cls(
+            plan, system, v, y, not pacing.begins, None, record, asked["events"], progress=asked["progress"],
+            step_control=step_control, options=asked,
+        )  # fmt: skip
 
     @classmethod
     def in_place(cls, system: System, method: str | Method, options: Options) -> Request:
@@ -408,8 +347,8 @@ class Request(NamedTuple):
                     "resume: expected a run with fixed steps, or a world, got one with adaptive steps; start anew from its last "
                     "state: v=run.v[-1], y=run.y[-1], t0=float(run.t[-1])"
                 )
-        fused, single = arithmetic(options.fused, options.dtype)
-        kind: Any = np.float32 if single else np.float64
+        refuse(options, "World")
+        kind: Any = np.float32 if options.dtype is not None and checks.is_single(options.dtype) else np.float64
         if before is not None:
             resumed = {name: getattr(options, name) for name in ("v", "y", "force") if getattr(own, name) is None}
             copies = {name: np.array(array, kind, order="C") for name, array in resumed.items() if array is not None}
@@ -417,15 +356,13 @@ class Request(NamedTuple):
         v, y, start, events = options.v, options.y, options.start, options.events
         method, system, _ = checked_system(system, method, v, y)
         system = copy.deepcopy(system)
-        dt = checks.step(options.dt)
-        if single:
-            from . import float32  # only such worlds need it
-
-            dt = float32.step(system, method, dt)
+        asked = Checked(options, None, way="World", system=system, method=method)
+        if not asked.given("dt"):
+            raise ArgumentError("dt: expected a number other than zero in units of time, got None")
+        single, dt, t0, first, control = asked["dtype"], asked["dt"], asked["t0"], asked["start_step"], asked["control"]
         if before is not None:
             continuation.goes_on_alike(before, method, dt)
-        machine = machine_of(options.device, "rust")
-        t0 = 0.0 if options.t0 is None else checks.number("t0", options.t0, unit="units of time")
+        of_plan = asked.of_plan()
         batch = checks.shape_of("y", y)[len(system.y_shape) :]
         v = np.empty((0, *batch), np.dtype(kind)) if velocities(system, v) is not v else v
         v = checks.in_place("v", v, (*system.v_shape, *batch), dtype=kind)
@@ -440,9 +377,7 @@ class Request(NamedTuple):
                 raise ArgumentError("force: expected an array of its own, got one that shares memory with v or y")
         if checks.batch_shape({"system": system.batch, "v and y": batch}) != batch:
             raise ShapeError(f"v and y: the system's batch {system.batch} does not broadcast to theirs, {batch}")
-        first = 0 if options.start_step is None else checks.count("start_step", options.start_step, 0)
-        choice = method.start_choice(start)
-        stepped, control = system, a_control(options.control)
+        stepped = system
         if dt < 0.0:
             goes_back(system, control)
         if control is not None:
@@ -455,6 +390,8 @@ class Request(NamedTuple):
         if before is not None and before.carry is not None and before.holds(stepped, batch, v, y):
             slot = np.array(before.carry, dtype=kind).reshape(-1)
         if single:
+            from . import float32  # only such worlds need it
+
             float32.check_inputs(stepped, abs(t0) + first * abs(dt))
         stepped.check_time(abs(t0) + first * abs(dt))
         not_with_exact(method, force=force, events=events, control=control)
@@ -463,15 +400,12 @@ class Request(NamedTuple):
         if before is None and first == 0:
             check_algebraic(stepped, y, t0)
         seen = stepped.over_steps(method, t0, dt)
-        plan = engine.Plan(
-            seen, method, batch, dt, t0, first, choice=choice, fused=fused, force=force, single=single, device=machine
-        )
+        plan = engine.Plan(seen, method, batch, dt, t0, force=force, **of_plan)
         if seen.controller is not None:
             plan = plan._replace(memory=_memory(seen, batch, before))
             if slot is not None and plan.memory is not None:
                 slot = np.concatenate([slot, plan.memory.reshape(-1).astype(kind)])
-        watched = None if events is None else event_list(events, "direct")
-        return cls(plan, stepped, v, y, slot is not None, events=watched, start=start, slot=slot)
+        return cls(plan, stepped, v, y, slot is not None, events=asked["events"], start=start, slot=slot, options=asked)
 
     @classmethod
     def one_step(cls, system: System, method: str | Method, options: Options, batch: Shape | None = None) -> Request:
@@ -483,10 +417,12 @@ class Request(NamedTuple):
         states = () if options.v is None and options.y is None else (options.v, options.y)
         system = system.for_state_shapes(*(0.0 if each is None else each for each in states))
         fits_together(system, method)
-        dt = 1.0 if options.dt is None else checks.number("dt", options.dt, positive=True, unit="units of time")
-        t0 = 0.0 if options.t0 is None else checks.number("t0", options.t0, unit="units of time")
-        fused, single = arithmetic(options.fused, options.dtype)
-        control, form = a_control(options.control), known_form(options.form)
+        asked = Checked(
+            options._replace(dt=1.0 if options.dt is None else options.dt), None, way="step", system=system, method=method
+        )
+        dt, t0, fused, single, control, form = (asked[name] for name in ("dt", "t0", "fused", "dtype", "control", "form"))
+        if dt < 0.0:
+            raise ArgumentError(f"dt: expected a number above zero in units of time, got {dt:g}")
         if form != "direct" and (fused or control is not None):
             raise UnsupportedError("form: form='matrix' goes without fused=, attempt= and control=")
         if form != "direct":
@@ -496,16 +432,11 @@ class Request(NamedTuple):
         if single:
             from . import float32
 
-            dt = float32.step(system, method, dt)
             float32.check_inputs(system, t0)
-        choice = method.start_choice(options.start)
-        if options.force is not None:
-            forced(system)
+        choice = asked["start"]
         shapes = {"v": system.v_shape, "y": system.y_shape, "force": system.v_shape}
-        arrays = {name: getattr(options, name) for name in shapes if getattr(options, name) is not None}
-        blocks = {name: checks.block(name, array, shapes[name], system.axes) for name, array in arrays.items()}
-        batches = {"system": system.batch, "control": () if control is None else control.batch}
-        batches |= {name: block.shape[len(shapes[name]) :] for name, block in blocks.items()}
+        blocks = {name: asked[name] for name in shapes if asked.given(name)}
+        batches = asked.batches()
         batch = checks.batch_shape(batches) if batch is None else checks.batch_shape(batches | {"members": batch})
         for name, block in blocks.items():
             if single:

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..base import checks, registry
 from ..base.arrays import Array, Whole
-from ..base.immutable import ValueEquality, by_value
+from ..base.immutable import FixedDict, ValueEquality, by_value
 from ..base.reprs import MAX_LINE, counted, facts, shortened
 from ..errors import ArgumentError, UnsupportedError
 from ..model.methods import Method
@@ -84,7 +84,6 @@ class AdaptiveState(NamedTuple):
         pace: the state of the step-size controller, shape (numbers, *batch), with the last output time in it.
         last: the last output time.
         method: name of the method.
-        options: arguments of ``integrate`` that hold for the run that goes on, too: ``max_step``, ``jumps``, ``positive``.
     """
 
     v: Array
@@ -92,7 +91,6 @@ class AdaptiveState(NamedTuple):
     pace: Array
     last: Any
     method: str
-    options: dict[str, Any] = {}  # noqa: RUF012  # it is not written to
 
 
 class Run(ValueEquality):
@@ -170,6 +168,7 @@ class Run(ValueEquality):
         controller_state: AdaptiveState | None = None,
         fused: bool = False,
         force: Array | None = None,
+        options: dict[str, Any] | None = None,
     ) -> None:
         self.t = t
         self.v = v
@@ -197,6 +196,8 @@ class Run(ValueEquality):
         self.controller_state = controller_state
         self.fused = fused
         self.force = force
+        #: The options that hold for a run that goes on, too, beside those that are attributes.
+        self.options = FixedDict(options or {})
         self.events: dict[str, Occurrences] = {}
         self.stopped_at: Array | None = None
 

@@ -12,7 +12,7 @@ from ..base.arrays import Array
 from ..model.systems import System
 from .diagnostics import findings_of
 from .findings import is_heard
-from .options import block_like
+from .options.parts import block_like
 from .request import Request
 from .result import Run
 

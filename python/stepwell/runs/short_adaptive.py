@@ -15,10 +15,10 @@ from ..model.systems import NBody, System
 from . import engine, known_energy
 from .adaptive import of_extra_steps, paces_of, run_of
 from .diagnostics import MANY
+from .options.tolerance import lost_in_tolerance
 from .request import Request
 from .result import AdaptiveState, Run
 from .short import NOT_MADE, TAME, ShortRun
-from .tolerance import lost_in_tolerance
 
 
 class ShortAdaptiveRun(ShortRun):

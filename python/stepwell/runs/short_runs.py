@@ -9,14 +9,14 @@ import numpy as np
 
 from .. import _core
 from ..base.arrays import Array, Shape
-from ..base.immutable import frozen
 from ..model.methods import Method
 from ..model.systems import NBody, System
 from . import engine
 from .diagnostics import finds_growth_only
 from .findings import may_have_amounts
 from .fixed import fixed_run
-from .options import Options
+from .options import OPTIONS, Options
+from .options.checked import asked_for, fixed
 from .request import Request
 from .result import Run
 from .short import NOT_MADE, TAME, ShortRun
@@ -136,15 +136,7 @@ def _prepared(system: System, method: str | Method, options: Options) -> ShortRu
 
 def fixed_options(options: Options) -> Options:
     """Options that do not change any more."""
-    return Options(*map(_own, Options._fields, options))
-
-
-def _own(name: str, option: Any) -> Any:
-    if isinstance(option, np.ndarray):
-        return frozen(name, option)
-    if type(option) in (list, tuple):
-        return type(option)(frozen(name, each) if isinstance(each, np.ndarray) else each for each in option)
-    return option
+    return Options(*map(fixed, Options._fields, options))
 
 
 class ShortFixedRun(ShortRun):
@@ -209,10 +201,10 @@ def short_run_of(system: System, method: str | Method, options: Options) -> Shor
 def short_run_of_request(system: System, request: Request, shapes: tuple[Shape, Shape]) -> ShortRun | None:
     """The run without its start; None if it is not known to be short."""
     plan = request.plan
-    asks_for_more = plan.record or request.record or request.events is not None or request.progress
-    is_other = plan.form != "direct" or plan.backend != "rust" or plan.device is not None
+    assert request.options is not None
+    asks_for_more = any(not OPTIONS[name].in_short_runs for name in asked_for(request.options.options))
     has_own = isinstance(plan.t0, np.ndarray) or plan.memory is not None
-    if asks_for_more or is_other or has_own or not plan.members:
+    if asks_for_more or has_own or plan.form != "direct" or plan.device is not None or not plan.members:
         return None
     # A block of another shape may mean another batch, or another system.
     if any(shape not in ((), whole.shape) for shape, whole in zip(shapes, (request.v, request.y), strict=True)):

@@ -17,7 +17,7 @@ from ..model.systems import System
 from ..reference.around import wrapped
 from . import engine
 from .findings import Finding
-from .positive import name_of, places_of
+from .options.positive import name_of, places_of
 from .result import Run, Status
 
 #: Why a member stopped, in words.
@@ -154,7 +154,7 @@ def _left_for_below_zero(run: Run, index: Shape) -> str:
         return ""
     blocks, rates = (run.controller_state.v, run.controller_state.y), _rates_there(run)
     state, rate = (np.concatenate([checks.member(block, index).reshape(-1) for block in each]) for each in (blocks, rates))
-    places = np.array(places_of(run.system, run.controller_state.options["positive"]))
+    places = np.array(places_of(run.system, run.options["positive"]))
     with np.errstate(all="ignore"):
         left = np.where(rate[places] < 0.0, state[places] / -rate[places], np.inf)
     return name_of(run.system, int(places[left.argmin()]))

@@ -14,7 +14,6 @@ from ..base.arrays import Array
 from ..base.reprs import MAX_LINE, counted, facts, shortened
 from ..errors import ArgumentError, FixedError, ShapeError, UnsupportedError
 from ..model import setting
-from ..model.controls import AnyControl
 from ..model.inputs import Input
 from ..model.methods import Method
 from ..model.systems import System
@@ -22,12 +21,15 @@ from . import engine, float32
 from .continuation import Continuation, bits_of_parameters
 from .findings import warn_of
 from .live import LARGEST, PLAIN, Live, Parameters, members_at
-from .options import Options, controlled
+from .options import named, with_options
+from .options.parts import controlled
 from .request import Request
-from .result import Run
 
 if TYPE_CHECKING:
+    from typing import Unpack
+
     from .occurrences import Occurrences
+    from .options.table import RunOptions
 
 #: By this share of each number algebraic equations may be off in a state that was written, where those of other members are as
 #: the steps left them.
@@ -36,6 +38,7 @@ MOST_WRITTEN = 1e-3
 LOOKS = 64
 
 
+@with_options("World")
 class World:
     """A loop over the user's own arrays: everything is checked and prepared once, then ``step`` works in place.
 
@@ -43,27 +46,7 @@ class World:
         system: the system to step. Its parameters are copied: changing an array of parameters later has no effect; ``set`` and
             ``parameters`` change them.
         method: its name, or what ``stepwell.method`` returns.
-        v: velocity block, a writeable C-contiguous array of ``dtype`` and of shape (*block, *batch).
-        y: coordinate block, likewise; it may share no memory with ``v``.
-        dt: the step, in units of time, below zero to go back.
-        t0: time of step 0, 0 if None.
-        start_step: number of the first step, 0 if None.
-        start: how to start a method that has several ways; see ``method(…).starts``.
-        control: an ``EnergyControl`` or a ``Projection``, to keep the energy constant.
-        force: what is added to v̇ in every stage: wind, or the push of a player. A C-contiguous array of the dtype and shape of v,
-            yours to write to: each call of ``step`` reads it once and takes it as constant over its steps. In the units of v per
-            unit of time: for bodies a force per mass, that is an acceleration.
-        fused: compute each step with fused multiply-adds; see ``integrate``.
-        dtype: ``"float64"`` or ``"float32"``, of the arrays and of the arithmetic; see ``integrate``.
-        events: quantities whose changes of sign are located, as of ``integrate``; those of the last call of ``step`` are in
-            ``world.events``. No event stops a member of a world; one with ``then=`` changes its state within the step.
-        resume: a world or a run with fixed steps that this one continues, to the bit: all of the above but ``events`` is then
-            known, and may be given again, as for ``integrate``. Its arrays are copies; with ``v`` and ``y`` of your own it begins
-            from these, in place.
-        device: what makes the steps, as for ``integrate``: "cpu", "opencl", "opencl:1"; None is the CPU, or what
-            ``STEPWELL_DEVICE`` names. The bits are the same. Your arrays stay in the memory of the host: each call of ``step``
-            takes the state to the device and back, about a millisecond and more for many members. So this pays for a hundred
-            thousand members, or for many steps a call. Parameters go there again where they have changed.
+        **options: those that go with a world, of the table in ``stepwell.runs.options``; ``help(stepwell.World)`` shows them.
 
     Raises:
         ArgumentError: what was given and what was expected.
@@ -99,32 +82,10 @@ class World:
         >>> finer = sw.World(world.system, "rk4", dt=0.01, v=v.copy(), y=y.copy(), t0=world.t)
     """
 
-    __slots__ = ("_control", "_core", "_events", "_frames", "_live", "_plan", "_start", "_system", "_v", "_y", "step")
+    __slots__ = ("_control", "_core", "_events", "_frames", "_live", "_options", "_plan", "_start", "_system", "_v", "_y", "step")
 
-    def __init__(
-        self,
-        system: System,
-        method: str | Method,
-        *,
-        v: Array | None = None,
-        y: Array | None = None,
-        dt: float | None = None,
-        t0: float | None = None,
-        start_step: int | None = None,
-        start: str | None = None,
-        control: AnyControl | None = None,
-        force: Array | None = None,
-        fused: bool | None = None,
-        dtype: Any = None,
-        events: Any = None,
-        device: str | None = None,
-        resume: Run | World | None = None,
-    ) -> None:
-        options = Options(
-            v=v, y=y, dt=dt, t0=t0, start_step=start_step, start=start, control=control, force=force, fused=fused, dtype=dtype,
-            events=events, resume=resume, device=device,
-        )  # fmt: skip
-        request = Request.in_place(system, method, options)
+    def __init__(self, system: System, method: str | Method, **options: Unpack[RunOptions]) -> None:
+        request = Request.in_place(system, method, named("World", options))
         plan = request.plan
         self._plan, self._system, self._start, self._events = plan, request.system, request.start, request.events
         self._v, self._y = v, y = request.v, request.y
@@ -133,9 +94,10 @@ class World:
         self._core = loop = _loop(plan, v.reshape(-1), y.reshape(-1), request.slot, force)
         if plan.memory is not None and request.slot is None:
             loop.remember(plan.memory.astype(y.dtype).reshape(-1))
-        self._frames = None
+        self._frames, self._options = None, request.going_on
         self._live: dict[str, Live] = {}
         #: The control as it was given, without a target of its own: members that are reset aim at that of their new state.
+        control = options.get("control")
         self._control = control if getattr(control, "target", self) is None else None
         make: Callable[..., bool] = loop.step
         if request.events is not None:
@@ -465,6 +427,7 @@ class World:
         system, plan = self.system, self._plan
         options: dict[str, Any] = {"t0": plan.t0, "start_step": self.step_number, "dt": plan.dt, "start": self._start}
         options |= {"fused": plan.fused, "dtype": str(self._y.dtype), "control": system.keeper}
+        options |= self._options
         options["force"] = None if plan.force is None else plan.force.copy()
         carry = self._core.carry() if plan.method.begins else None
         memory = None

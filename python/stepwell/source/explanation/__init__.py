@@ -24,7 +24,8 @@ from ...model.systems.base import a_system
 from ...runs import engine, float32
 from ...runs.engine.counted import written
 from ...runs.engine.linear import matrix_model
-from ...runs.options import Options, machine_of
+from ...runs.options import Options
+from ...runs.options.parts import machine_of
 from ...runs.request import Request
 from .beside import lines_beside
 from .listing import Line, Section, line_of_matrices, lines_of_program, lines_of_tape

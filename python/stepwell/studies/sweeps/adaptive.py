@@ -22,10 +22,11 @@ from ...runs.diagnostics import may_be_stiff, why_steps_are_short
 from ...runs.engine import PACE_NUMBERS, WAYPOINTS
 from ...runs.making import step
 from ...runs.options import Options
+from ...runs.options.checked import Checked
+from ...runs.options.tolerance import MAX_ABSOLUTE_SHARE, lost_in_tolerance, order_of_series
 from ...runs.request import Request
 from ...runs.result import Run, Status
 from ...runs.stops import why_stopped
-from ...runs.tolerance import MAX_ABSOLUTE_SHARE, lost_in_tolerance, order_of_series
 from .axes import Grid
 from .exponents import Exponents
 from .observed import Piece
@@ -69,32 +70,14 @@ class _Evaluations(Reduction):
         }
 
 
-def arguments(
-    grid: Grid,
-    method: Method,
-    tolerance: Any,
-    at: Any,
-    options: Mapping[str, Any],
-    fixed: Mapping[str, Any],
-    outcomes: Iterable[Outcome],
-) -> tuple[dict[str, Any], Array]:
+def arguments(grid: Grid, method: Method, asked: Checked, outcomes: Iterable[Outcome]) -> tuple[dict[str, Any], Array]:
     """Further arguments of ``integrate``, and the times.
-
-    Args:
-        grid: the members.
-        method: the method.
-        tolerance: the user's argument; None if it is an axis.
-        at: the user's argument.
-        options: the arguments that need a tolerance, by name; None for those that the user left out.
-        fixed: the arguments that need fixed steps, by name; None for those that the user left out.
-        outcomes: the outcomes.
 
     Raises:
         ArgumentError: what was given and what was expected.
         UnsupportedError: if an argument is not supported with a tolerance.
     """
-    if wrong := [name for name, value in fixed.items() if value is not None]:
-        raise ArgumentError(f"{', '.join(wrong)}: works with fixed steps only, and tolerance= or at= was given")
+    tolerance = asked["tolerance"]
     varied = {axis.argument: axis for axis in grid.axes}
     if "dt" in varied:
         raise ArgumentError(
@@ -105,23 +88,12 @@ def arguments(
         if axis.own:
             raise ArgumentError(f"axes: tolerance: expected one number for each member, got shape {axis.values.shape}")
         order_of_series(method, axis.values)
-    check_times(tolerance is not None or "tolerance" in varied, at)
-    times = np.atleast_1d(checks.numbers("at", at, unit="units of time"))
+    check_times(tolerance is not None or "tolerance" in varied, asked.options.at)
+    times: Array = asked["at"]
     if times.ndim > 1:
         raise ShapeError(f"at: expected times along one axis, the same for all members, got shape {times.shape}")
     _fits_outcomes(outcomes, times)
-    arguments = {} if tolerance is None else {"tolerance": _one_for_all(tolerance)}
-    if options["max_steps"] is not None:
-        arguments["max_steps"] = checks.count("max_steps", options["max_steps"], 1)
-    if options["max_step"] is not None:
-        arguments["max_step"] = checks.number("max_step", options["max_step"], positive=True, unit="units of time")
-    if options["jumps"] is not None:
-        arguments["jumps"] = jumps = np.atleast_1d(checks.numbers("jumps", options["jumps"], unit="units of time"))
-        if jumps.ndim > 1:
-            raise ShapeError(f"jumps: expected times along one axis, the same for all members, got shape {jumps.shape}")
-    if options["positive"] is not None:
-        arguments["positive"] = options["positive"]
-    return arguments, times
+    return {} if tolerance is None else {"tolerance": _one_for_all(tolerance)}, times
 
 
 def _one_for_all(tolerance: Any) -> Any:
@@ -149,12 +121,14 @@ def _fits_outcomes(outcomes: Iterable[Outcome], times: Array) -> None:
             )
 
 
-def refuse_fixed(outcomes: Iterable[Outcome], options: Mapping[str, Any]) -> None:
-    """Raise if there is an argument that needs a tolerance."""
-    if options["max_steps"] is not None:
-        raise ArgumentError("max_steps: works with tolerance= and at= only; steps= is the number of steps of fixed length")
-    if wrong := [name for name, value in options.items() if value is not None]:
-        raise ArgumentError(f"{', '.join(wrong)}: works with tolerance= and at= only; steps of fixed length are dt long")
+def refuse(fixed: Mapping[str, Any]) -> None:
+    """Raise if there is an argument of a sweep that needs fixed steps."""
+    if wrong := [name for name, value in fixed.items() if value is not None]:
+        raise ArgumentError(f"{', '.join(wrong)}: works with fixed steps only, and tolerance= or at= was given")
+
+
+def refuse_fixed(outcomes: Iterable[Outcome]) -> None:
+    """Raise if there is an outcome that needs a tolerance."""
     if any(isinstance(each, Evaluations) for each in outcomes):
         raise UnsupportedError(
             "outcomes: Evaluations: with fixed steps every member has the same number, method(…).evaluations a step; it goes "

@@ -15,14 +15,23 @@ from ...analysis.growth import Growth
 from ...analysis.stiffness import HELD_DOWN, Stiff
 from ...base import checks
 from ...base.reprs import counted
-from ...errors import AccuracyWarning, ArgumentError, DivergenceWarning, DTypeError, StiffnessWarning, ToleranceWarning
+from ...errors import (
+    AccuracyWarning,
+    ArgumentError,
+    DivergenceWarning,
+    DTypeError,
+    ShapeError,
+    StiffnessWarning,
+    ToleranceWarning,
+)
 from ...model.methods import Method
 from ...model.methods import method as find_method
 from ...model.systems import System
 from ...runs import float32
 from ...runs.findings import is_heard, warn_of
 from ...runs.negative import Negative
-from ...runs.options import machine_of
+from ...runs.options import OPTIONS, named, with_options
+from ...runs.options.checked import Checked
 from . import adaptive, happenings, lengths
 from .adaptive import Evaluations
 from .axes import OF_THE_RUN, Chunk, Grid
@@ -38,9 +47,11 @@ from .stores import Memory, Zarr, store_of
 from .task import Done, Task, probed
 
 if TYPE_CHECKING:
+    from typing import Unpack
+
     import xarray
 
-    from ...model.controls import AnyControl
+    from ...runs.options.table import RunOptions
 
 #: Outcomes by word.
 WORDS: dict[str, type[Outcome]] = {
@@ -63,42 +74,25 @@ MAX_ADAPTIVE_MEMBERS = 1 << 11
 MAX_DEVICE_MEMBERS = 1 << 22
 #: The least number of chunks for each worker, as long as each chunk has at least MIN_MEMBERS members.
 CHUNKS_OF_A_WORKER, MIN_MEMBERS = 4, 256
+#: The options of a run that the runs of chunks do not get as they are.
+OF_A_SWEEP = {*OF_THE_RUN, "steps", "every", "at", "events", "fused", "dtype", "t0", "progress", "threads", "device"}
 
 
+@with_options("sweep")
 def sweep(
     system: System | Callable[..., System],
     axes: Mapping[str, Any],
     method: str | Method,
     *,
-    v: Any = None,
-    y: Any = None,
-    dt: float | None = None,
-    steps: int | None = None,
     transient: int | None = None,
     outcomes: Any = None,
-    every: int | None = None,
     observe: int | None = None,
-    tolerance: Any = None,
-    at: Any = None,
-    max_steps: int | None = None,
-    max_step: float | None = None,
-    jumps: Any = None,
-    positive: Any = None,
-    control: AnyControl | None = None,
-    force: Any = None,
-    events: Any = None,
-    fused: bool = False,
-    dtype: Any = "float64",
-    t0: float = 0.0,
-    start: str | None = None,
     units: Mapping[str, str] | None = None,
     store: Any = None,
     engine: Any = None,
-    threads: int | None = None,
     chunk: int | None = None,
     memory: float | None = None,
-    progress: bool = False,
-    device: str | None = None,
+    **options: Unpack[RunOptions],
 ) -> xarray.Dataset:
     """Run an ensemble, and return the outcomes of its members in arrays with named dimensions.
 
@@ -116,48 +110,21 @@ def sweep(
             The dimension is the last axis of the values; axes before it are those of the argument. ``stepwell.sweeps.random``
             and ``sobol`` make samples.
         method: its name, or what ``stepwell.method`` returns.
-        v: velocity block at the start, the same for all members.
-        y: coordinate block at the start, likewise.
-        dt: the step, in units of time, above zero; with a tolerance the step to try first, or None.
-        steps: number of observed steps, one or more.
-        transient: number of steps before these, which are not observed; none if None.
+        transient: number of steps before the observed ones; none if None.
         outcomes: the outcomes of each member, one or a list: "last", "extremes", "mean", "crossing", "period", "lyapunov",
             "evaluations", "history"; the classes of ``stepwell.sweeps`` with these names, with arguments; or a function of the
             ``Run`` of a chunk. None is "last", or with ``every``, "history". How a member ended, ``status`` and
             ``first_bad_step``, is always among the results.
-        every: steps between the states of a history, or of the runs that functions get.
         observe: steps between the states that reductions see; one if None. Reductions miss what happens in between.
-        tolerance: in place of ``steps``, for adaptive steps of each member: a number, or a pair (relative, absolute), as for
-            ``integrate``. An axis of this name has the relative ones.
-        at: with a tolerance, the times whose states are observed: the last is that of "last", a history has all of them, and
-            reductions see the states at these times and no others. Not with ``transient``, ``every`` or ``observe``.
-        max_steps: with a tolerance, the most steps of a member, including rejected ones; a million if None.
-        max_step: with a tolerance, the longest step, in units of time.
-        jumps: with a tolerance, times that no step crosses, shape (jumps,): as for ``integrate``, the same for all members.
-        positive: with a tolerance, the components that must not become negative, as for ``integrate``.
-        control: as for ``integrate``, the same for all members.
-        force: likewise.
-        events: events to locate in each member, as for ``integrate``; an event may stop a member, or change its state. The
-            results of an event ``ground`` are ``ground_count``, the number of its occurrences, and ``ground_t``, the time of the
-            first, NaN without one; ``stopped_at`` is the time at which an event stopped a member. All states that reductions see
-            are then in memory at once. Not with ``transient`` or "lyapunov".
-        fused: likewise.
-        dtype: ``"float64"`` or ``"float32"``, the precision of steps, as for ``integrate``. In float32 states are float32, and
-            outcomes are computed from them in float64; a dt is rounded to float32. With fixed steps only.
-        t0: time of step 0.
-        start: likewise.
         units: words for "t", "v", "y", parameters and results, by name; they become attributes.
         store: a path ending in .zarr or .nc, or None for memory. Every finished chunk is written there, and an interrupted sweep
             goes on where it stopped when it is called again. With a store the results need not fit in memory.
         engine: None for threads of this process, an ``Executor`` of ``concurrent.futures``, or a ``dask.distributed.Client``.
-        threads: the number of threads without an engine; None for as many as there are cores, or one with a device.
         chunk: the most members of a chunk; None for as many as ``memory`` allows, up to 16384, or 4194304 with a device.
         memory: the bytes that a chunk may take while it is computed; None for 64 MiB, or 1 GiB with a device, of whose memory it
             takes half at most. As many chunks are computed at once as there are workers.
-        progress: whether to show a progress bar, in a terminal or in a notebook.
-        device: what steps the members, as for ``integrate``: "cpu", "opencl", "opencl:1"; None is the CPU, or what
-            ``STEPWELL_DEVICE`` names. The bits are the same. A GPU needs a hundred thousand members or more to be busy. Exponents
-            of "lyapunov" are computed by the CPU.
+        **options: those that go with a sweep, of the table in ``stepwell.runs.options``, the same for all members;
+            ``help(stepwell.sweep)`` shows them.
 
     Returns:
         An ``xarray.Dataset``. Its attributes say how it was made; ``bits`` is a hash of all results.
@@ -185,39 +152,39 @@ def sweep(
         (('omega', 'y0'), array([3.141593, 3.141593]))
     """
     need("xarray")
-    grid, method, named = a_grid(axes), find_method(method), named_units(units)
-    paced = tolerance is not None or at is not None or any(axis.argument == "tolerance" for axis in grid.axes)
-    fixed = {"v": v, "y": y, "dt": dt, "force": force, "tolerance": tolerance}
-    _fits_axes(system, {axis.argument for axis in grid.axes}, fixed, ("y",) if paced else ("y", "dt"))
-    if dt is not None:
-        fixed["dt"] = checks.number("dt", dt, positive=True, unit="units of time")
+    grid, method, named_as = a_grid(axes), find_method(method), named_units(units)
+    asked_for = named("sweep", options)
+    varied = {axis.argument for axis in grid.axes}
+    paced = asked_for.tolerance is not None or asked_for.at is not None or "tolerance" in varied
+    asked = Checked(asked_for, "and tolerance= or at= was given" if paced else None, way="sweep", method=method)
+    fixed = {name: getattr(asked_for, name) for name in OF_THE_RUN}
+    _fits_axes(system, varied, fixed, ("y",) if paced else ("y", "dt"))
+    if asked.given("dt"):
+        fixed["dt"] = checks.number("dt", asked_for.dt, positive=True, unit="units of time")
     arguments = {name: value for name, value in fixed.items() if value is not None}
-    arguments |= {"t0": checks.number("t0", t0, unit="units of time"), "fused": checks.flag("fused", fused), "threads": 1}
-    arguments |= {name: value for name, value in (("control", control), ("start", start)) if value is not None}
-    if single := checks.is_single(dtype):
+    arguments |= {"t0": asked["t0"], "fused": asked["fused"], "threads": 1} | _the_same_for_all(asked)
+    if single := asked["dtype"]:
         _fits_single(grid)
         arguments["dtype"] = "float32"
-    machine = machine_of(device, "rust")
-    if machine is not None:
+    if (machine := asked["device"]) is not None:
         from ...device import promise  # only such sweeps need it
 
         promise.check(machine, single=single)
         arguments["device"] = machine.described.name
-    elif device is not None:
-        arguments["device"] = device  # "cpu", in other processes, too
-    every = None if every is None else checks.count("every", every, 1)
+    elif asked.given("device"):
+        arguments["device"] = asked_for.device  # "cpu", in other processes, too
+    every, steps, threads = asked["every"], asked["steps"], asked["threads"] or None
     kept_of_each = _outcomes(outcomes, every)
-    if events is not None:
-        located = happenings.events_of(events, kept_of_each, transient)
+    if (located := asked["events"]) is not None:
+        located = happenings.events_of(located, kept_of_each, transient)
         arguments["events"], kept_of_each = list(located), (*kept_of_each, happenings.Happenings(located))
     times = None
     if paced:
-        others = {"steps": steps, "transient": transient, "every": every, "observe": observe, "start": start}
-        options = {"max_steps": max_steps, "max_step": max_step, "jumps": jumps, "positive": positive}
-        more, times = adaptive.arguments(grid, method, tolerance, at, options, others, kept_of_each)
+        adaptive.refuse({"transient": transient, "every": every, "observe": observe})
+        more, times = adaptive.arguments(grid, method, asked, kept_of_each)
         arguments |= more
     else:
-        adaptive.refuse_fixed(kept_of_each, {"max_steps": max_steps, "max_step": max_step, "jumps": jumps, "positive": positive})
+        adaptive.refuse_fixed(kept_of_each)
         if steps is None:
             raise ArgumentError("steps: expected with fixed steps; or give tolerance= and at= for adaptive steps")
     task = Task(
@@ -225,7 +192,7 @@ def sweep(
         method=method,
         options=arguments,
         transient=0 if transient is None else checks.count("transient", transient, 0),
-        steps=0 if steps is None else checks.count("steps", steps, 1),
+        steps=steps or 0,
         observe=1 if observe is None else checks.count("observe", observe, 1),
         every=every,
         outcomes=kept_of_each,
@@ -237,7 +204,7 @@ def sweep(
     workers = Engine(engine, 1 if machine is not None and engine is None and threads is None else threads)
     mixed = times is None and lengths.together(first, method, kept_of_each, arguments)
     shape = grid.chunk_shape(_members(task, first, grid, workers.workers, chunk), mixed=mixed)
-    layout = layout_of(task, grid, first, bits, named)
+    layout = layout_of(task, grid, first, bits, named_as)
     if taken := sorted(names & {*layout.coords, *grid.dims}):
         raise ArgumentError(
             f'axes: {taken[0]!r} is the name of a result; give the dimension another name, as ("run", values), or '
@@ -245,9 +212,22 @@ def sweep(
         )
     where = store_of(store)
     results = Memory(layout, shape) if where is None else where[0](where[1], layout, shape)
-    _compute(task, grid, workers, results, checks.flag("progress", progress))
+    _compute(task, grid, workers, results, asked["progress"])
     dataset: xarray.Dataset = results.finish()
     return dataset
+
+
+def _the_same_for_all(asked: Checked) -> dict[str, Any]:
+    """The options that the runs of all chunks get as they are."""
+    passed: dict[str, Any] = {}
+    for name, option in OPTIONS.items():
+        if name in OF_A_SWEEP or not asked.given(name):
+            continue
+        checked = asked[name]
+        if option.batch is not None and (axes := option.batch(checked, None)):
+            raise ShapeError(f"{name}: expected the same for all members of a sweep, got one of batch {axes}")
+        passed[name] = checked if option.plan is None else getattr(asked.options, name)
+    return passed
 
 
 def _memory(memory: float | None, machine: Any) -> float:

@@ -12,7 +12,8 @@ from ...model.inputs import Sampled
 from ...model.methods import Method
 from ...model.systems import System
 from ...runs import engine
-from ...runs.options import Options, last_time
+from ...runs.options import Options
+from ...runs.options.parts import last_time
 from ...runs.request import Request
 from ...runs.result import Run
 from .outcomes import Extremes, Last, Outcome

@@ -26,7 +26,8 @@ from ...runs.diagnostics import lost_equations, of_a_strong_control
 from ...runs.findings import Finding
 from ...runs.making import quietly, step
 from ...runs.negative import Negative, of_a_run
-from ...runs.options import Options, spread
+from ...runs.options import OPTIONS, Options
+from ...runs.options.parts import spread
 from ...runs.request import Request
 from ...runs.result import Run
 from .adaptive import NUMBERS_OF_A_CONTROLLER, Pieces, lost, numbers_of_waypoints
@@ -46,9 +47,6 @@ COPIES_OF_A_STATE = 4
 #: How many times the numbers of a member are in memory besides: at the start, in the carry, at the end.
 COPIES_OF_A_MEMBER = 12
 
-
-#: Arguments of ``integrate`` that a run does not carry.
-GIVEN_AGAIN = ("threads", "backend", "max_steps", "device")
 #: Makes a piece of a run: by its number of steps, the interval of the states that it saves, and the arguments of ``integrate``.
 Make = Callable[..., Run]
 
@@ -346,7 +344,7 @@ def _pieces_between_times(
 
 def _going_on(options: dict[str, Any], run: Run) -> dict[str, Any]:
     """The arguments that resume a run; those that it does not carry, such as threads, are repeated."""
-    return {"resume": run} | {name: value for name, value in options.items() if name in GIVEN_AGAIN}
+    return {"resume": run} | {name: value for name, value in options.items() if OPTIONS[name].given_again}
 
 
 @contextmanager

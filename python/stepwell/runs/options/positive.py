@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from ..base import checks
-from ..base.arrays import Array
-from ..errors import ArgumentError
-from ..model.systems import System
+from ...base import checks
+from ...base.arrays import Array
+from ...errors import ArgumentError
+from ...model.systems import System
 
 
 def places_of(system: System, components: Any) -> list[int]:

@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from ..base import checks
-from ..base.arrays import Array, Shape
-from ..errors import DTypeError, ShapeError, UnsupportedError
-from ..model.methods import Method
-from ..model.systems import System
-from ..reference.acceptance import Acceptance
-from . import engine
+from ...base import checks
+from ...base.arrays import Array, Shape
+from ...errors import DTypeError, ShapeError, UnsupportedError
+from ...model.methods import Method
+from ...model.systems import System
+from ...reference.acceptance import Acceptance
+from .. import engine
 
 #: An absolute tolerance above this fraction of the largest length of a block so far gives a warning.
 MAX_ABSOLUTE_SHARE = 0.01
@@ -88,7 +88,7 @@ def order_of_series(method: Method, relative: Array) -> int:
     """
     if not method.has_series or not relative.size:
         return 0
-    from ..reference import series_pace  # only such runs need it
+    from ...reference import series_pace  # only such runs need it
 
     least, most = (relative.item(),) * 2 if relative.size == 1 else (float(relative.min()), float(relative.max()))
     order = series_pace.order_of(least)

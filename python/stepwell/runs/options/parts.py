@@ -1,62 +1,32 @@
-"""The options of a run, and checks of those that work with fixed and with adaptive steps."""
+"""Checks of options, of states at the start and of times."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .. import _core
-from ..base import checks, registry
-from ..base.arrays import Array, Shape
-from ..base.reprs import of_member
-from ..errors import ArgumentError, UnknownNameError, UnsupportedError
-from ..model.compatibility import fits_together, one_state, velocities
-from ..model.controls import ConstraintControl, EnergyControl
-from ..model.methods import Method
-from ..model.methods import method as find_method
-from ..model.systems import Sampled, Sinusoid, System
-from ..model.systems.base import a_system
-from . import continuation
+from ... import _core
+from ...base import checks, registry
+from ...base.arrays import Array, Shape
+from ...base.reprs import of_member
+from ...errors import ArgumentError, UnknownNameError, UnsupportedError
+from ...model.compatibility import fits_together, one_state, velocities
+from ...model.controls import ConstraintControl, EnergyControl
+from ...model.methods import Method
+from ...model.methods import method as find_method
+from ...model.systems import Sampled, Sinusoid, System
+from ...model.systems.base import a_system
+from .. import continuation
 
 if TYPE_CHECKING:
-    from ..base.literals import Backend, StepForm
-    from .continuation import Continuation
-    from .events import Event
+    from ...base.literals import Backend, StepForm
+    from ..continuation import Continuation
+    from ..events import Event
+    from . import Options
 
 FORMS: tuple[StepForm, ...] = ("direct", "matrix")
 BACKENDS: tuple[Backend, ...] = ("rust", "numpy")
-
-
-class Options(NamedTuple):
-    """The arguments of ``integrate`` in their order, unchecked, None for those that were left out."""
-
-    v: Any = None
-    y: Any = None
-    dt: Any = None
-    steps: Any = None
-    every: Any = None
-    tolerance: Any = None
-    at: Any = None
-    control: Any = None
-    force: Any = None
-    record: Any = None
-    events: Any = None
-    form: Any = "direct"
-    fused: Any = None
-    dtype: Any = None
-    t0: Any = None
-    start: Any = None
-    max_steps: Any = None
-    max_step: Any = None
-    jumps: Any = None
-    positive: Any = None
-    progress: Any = False
-    threads: Any = None
-    backend: Any = "rust"
-    device: Any = None
-    start_step: Any = None
-    resume: Any = None
 
 
 #: The share of a component by which it may be off at the start of a run whose steps have no tolerance.
@@ -114,14 +84,9 @@ def machine_of(device: Any, backend: str) -> Any:
         if device not in (None, "cpu") and backend != "rust":
             raise ArgumentError(f"device: works with backend='rust' only, got backend={backend!r}")
         return None
-    from ..device import device_of  # only such runs need it
+    from ...device import device_of  # only such runs need it
 
     return device_of(device)
-
-
-def arithmetic(fused: Any, dtype: Any) -> tuple[bool, bool]:
-    """True if steps have fused multiply-adds, and whether they are in float32."""
-    return fused is not None and checks.flag("fused", fused), dtype is not None and checks.is_single(dtype)
 
 
 def controlled(system: System, method: Method, control: Any, v: Array, y: Array, dt: float) -> System:
@@ -143,7 +108,7 @@ def known_form(form: Any) -> StepForm:
 
 def event_list(events: Any, form: str) -> list[Event]:
     """The events as a list."""
-    from .events.event import several
+    from ..events.event import several
 
     if form != "direct":
         raise UnsupportedError(
@@ -177,7 +142,7 @@ def _is_smooth(given: Any) -> bool:
 
 def quantities(system: System, record: Any) -> list[str]:
     """The quantities to record, each once; raise if the system does not have one."""
-    if record is None or (type(record) is tuple and not record):
+    if type(record) is tuple and not record:
         return []
     names = [record] if isinstance(record, str) else checks.several("record", record, "quantities")
     known = list(dict.fromkeys(["energy", *system.recorded_shapes()]))
