@@ -15,7 +15,7 @@ from . import engine
 from .diagnostics import finds_growth_only
 from .findings import may_have_amounts
 from .fixed import fixed_run
-from .options import OPTIONS, Options
+from .options import Options
 from .options.checked import asked_for, fixed
 from .request import Request
 from .result import Run
@@ -27,6 +27,28 @@ MOST_BYTES = 1 << 17
 MOST_KEPT = 32
 #: At most so many numbers of an option, or of a start that is a list, are looked at.
 MOST_NUMBERS = 128
+#: The options that short runs, which the core makes with nothing around them, know.
+DONE_BY_THE_CORE = frozenset(
+    [
+        "v",
+        "y",
+        "dt",
+        "steps",
+        "every",
+        "tolerance",
+        "at",
+        "fused",
+        "dtype",
+        "t0",
+        "start",
+        "max_steps",
+        "max_step",
+        "jumps",
+        "threads",
+        "device",
+        "start_step",
+    ]
+)
 #: Whole numbers up to this one are floats.
 LARGEST_WHOLE = 1 << 53
 
@@ -202,7 +224,7 @@ def short_run_of_request(system: System, request: Request, shapes: tuple[Shape, 
     """The run without its start; None if it is not known to be short."""
     plan = request.plan
     assert request.options is not None
-    asks_for_more = any(not OPTIONS[name].in_short_runs for name in asked_for(request.options.options))
+    asks_for_more = not DONE_BY_THE_CORE.issuperset(asked_for(request.options.options))
     has_own = isinstance(plan.t0, np.ndarray) or plan.memory is not None
     if asks_for_more or has_own or plan.form != "direct" or plan.device is not None or not plan.members:
         return None

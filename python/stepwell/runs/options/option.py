@@ -30,7 +30,6 @@ class Option(NamedTuple):
         plan: the field of the plan that it sets; None if it sets none.
         goes_on: whether a run that goes on has it, unless it is given again.
         given_again: whether each piece of a run is given it, since it says how the piece is computed.
-        in_short_runs: whether a short run, which the core makes with nothing around it, does it, too.
         is_always_checked: whether None is checked, too, since it means what the environment says.
     """
 
@@ -42,7 +41,6 @@ class Option(NamedTuple):
     plan: str | None = None
     goes_on: bool = False
     given_again: bool = False
-    in_short_runs: bool = False
     is_always_checked: bool = False
 
     def text_of(self, way: Way | None) -> str | None:

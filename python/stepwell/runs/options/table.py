@@ -76,10 +76,8 @@ class RunOptions(TypedDict, total=False):
             """velocity block at the start, shape (*block, *batch), or one number for all; a first-order system has none.""",
             check=lambda v, asked: _block("v", v, asked),
             batch=lambda v, system: v.shape[len(system.v_shape) :],
-            in_short_runs=True,
             ways={
                 "World": """velocity block, a writeable C-contiguous array of ``dtype`` and of shape (*block, *batch).""",
-                "sweep": """velocity block at the start, the same for all members.""",
             },
         ),
     ]
@@ -89,7 +87,6 @@ class RunOptions(TypedDict, total=False):
             """coordinate block at the start, likewise.""",
             check=lambda y, asked: _block("y", y, asked),
             batch=lambda y, system: y.shape[len(system.y_shape) :],
-            in_short_runs=True,
             ways={"World": """coordinate block, likewise; it may share no memory with ``v``."""},
         ),
     ]
@@ -101,11 +98,6 @@ class RunOptions(TypedDict, total=False):
             time, or that part of a run of less than 2⁻¹⁵ units.""",
             check=_dt,
             batch=lambda dt, system: np.shape(dt),
-            in_short_runs=True,
-            ways={
-                "World": """the step, in units of time, below zero to go back.""",
-                "sweep": """the step, in units of time, above zero; with a tolerance the step to try first, or None.""",
-            },
         ),
     ]
     steps: Annotated[
@@ -113,11 +105,9 @@ class RunOptions(TypedDict, total=False):
         Option(
             """number of steps, one or more.""",
             check=lambda steps, asked: checks.count("steps", steps, 1),
-            in_short_runs=True,
             ways={
                 "adaptive": _FIXED_ONLY,
                 "World": No("a world is stepped by world.step(n)"),
-                "sweep": """number of observed steps, one or more.""",
             },
         ),
     ]
@@ -128,7 +118,6 @@ class RunOptions(TypedDict, total=False):
             tolerance accepted steps of each member count, and ``at`` is one time, the end; rows of ``run.t``, v and y are NaN
             where a member has made fewer steps than another.""",
             check=lambda every, asked: checks.count("every", every, 1),
-            in_short_runs=True,
             ways={"World": _OF_A_RUN, "sweep": """steps between the states of a history, or of the runs that functions get."""},
         ),
     ]
@@ -143,7 +132,6 @@ class RunOptions(TypedDict, total=False):
             array over the batch, or one with a number for each component, shape (*block, …) of y, which v has too; a list is
             refused. For methods with an ``error_order``: merson, fehlberg, fehlberg_5, bs32, dopri5, tsit5, vern7, dop853, vern9,
             taylor, and for stiff equations rosenbrock23, rodas4, rodas5p.""",
-            in_short_runs=True,
             ways={
                 "World": _NO_ADAPTIVE_WORLD,
                 "sweep": """in place of ``steps``, for adaptive steps of each member: a number, or a pair (relative, absolute), as
@@ -160,7 +148,6 @@ class RunOptions(TypedDict, total=False):
             errs by more than is tolerated: the step missed something and is rejected.""",
             check=_at,
             batch=lambda times, system: times.shape[1:],
-            in_short_runs=True,
             ways={
                 "World": _NO_ADAPTIVE_WORLD,
                 "sweep": """with a tolerance, the times whose states are observed: the last is that of "last", a history has all
@@ -176,7 +163,6 @@ class RunOptions(TypedDict, total=False):
             tolerance, too, where a projection acts on accepted steps. Verlet and leapfrog go without.""",
             check=lambda control, asked: a_control(control),
             batch=lambda control, system: control.batch,
-            ways={"World": """an ``EnergyControl`` or a ``Projection``, to keep the energy constant."""},
         ),
     ]
     force: Annotated[
@@ -245,8 +231,6 @@ class RunOptions(TypedDict, total=False):
             check=lambda fused, asked: checks.flag("fused", fused),
             default=False,
             plan="fused",
-            in_short_runs=True,
-            ways={"World": """compute each step with fused multiply-adds; see ``integrate``."""},
         ),
     ]
     dtype: Annotated[
@@ -259,12 +243,6 @@ class RunOptions(TypedDict, total=False):
             check=lambda dtype, asked: checks.is_single(dtype),
             default=False,
             plan="single",
-            in_short_runs=True,
-            ways={
-                "World": """``"float64"`` or ``"float32"``, of the arrays and of the arithmetic; see ``integrate``.""",
-                "sweep": """``"float64"`` or ``"float32"``, the precision of steps, as for ``integrate``. In float32 states are
-                float32, and outcomes are computed from them in float64; a dt is rounded to float32. With fixed steps only.""",
-            },
         ),
     ]
     t0: Annotated[
@@ -276,8 +254,6 @@ class RunOptions(TypedDict, total=False):
             check=_t0,
             default=0.0,
             batch=lambda t0, system: np.shape(t0),
-            in_short_runs=True,
-            ways={"World": """time of step 0, 0 if None.""", "sweep": """time of step 0, the same for all members."""},
         ),
     ]
     start: Annotated[
@@ -287,7 +263,6 @@ class RunOptions(TypedDict, total=False):
             check=lambda start, asked: asked.method.start_choice(start),
             default=0,
             plan="choice",
-            in_short_runs=True,
             ways={"adaptive": _FIXED_ONLY},
         ),
     ]
@@ -298,7 +273,6 @@ class RunOptions(TypedDict, total=False):
             check=lambda most, asked: checks.count("max_steps", most, 1),
             default=MOST_STEPS,
             given_again=True,
-            in_short_runs=True,
             ways={
                 "fixed": No("works with tolerance= and at= only; steps= is the number of steps of fixed length"),
                 "World": _NO_ADAPTIVE_WORLD,
@@ -313,7 +287,6 @@ class RunOptions(TypedDict, total=False):
             check=lambda longest, asked: checks.numbers("max_step", longest, positive=True, unit="units of time"),
             batch=lambda longest, system: longest.shape,
             goes_on=True,
-            in_short_runs=True,
             ways={"fixed": _ADAPTIVE_ONLY, "World": _NO_ADAPTIVE_WORLD},
         ),
     ]
@@ -326,7 +299,6 @@ class RunOptions(TypedDict, total=False):
             check=lambda jumps, asked: np.atleast_1d(checks.numbers("jumps", jumps, unit="units of time")),
             batch=lambda jumps, system: jumps.shape[1:],
             goes_on=True,
-            in_short_runs=True,
             ways={"fixed": _ADAPTIVE_ONLY, "World": _NO_ADAPTIVE_WORLD},
         ),
     ]
@@ -357,7 +329,6 @@ class RunOptions(TypedDict, total=False):
             default=0,
             plan="threads",
             given_again=True,
-            in_short_runs=True,
             ways={
                 "World": No("a world is stepped by the thread that calls it"),
                 "sweep": """the number of threads without an engine; None for as many as there are cores, one with a device.""",
@@ -389,7 +360,6 @@ class RunOptions(TypedDict, total=False):
             plan="device",
             given_again=True,
             is_always_checked=True,
-            in_short_runs=True,
             ways={
                 "World": """what makes the steps, as for ``integrate``: "cpu", "opencl", "opencl:1"; None is the CPU, or what
                 ``STEPWELL_DEVICE`` names. The bits are the same. Your arrays stay in the memory of the host: each call of
@@ -408,10 +378,8 @@ class RunOptions(TypedDict, total=False):
             check=lambda first, asked: checks.count("start_step", first, 0, checks.LAST_STEP - (asked["steps"] or 0)),
             default=0,
             plan="first",
-            in_short_runs=True,
             ways={
                 "adaptive": _FIXED_ONLY,
-                "World": """number of the first step, 0 if None.""",
                 "sweep": No("a sweep begins at t0="),
             },
         ),

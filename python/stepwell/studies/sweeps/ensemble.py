@@ -98,7 +98,8 @@ def sweep(
 
     Members are computed in chunks, on all cores, in other processes or on a cluster. The outcomes of a member have the same bits
     on every engine and in every division into chunks. Trajectories are reduced while they are computed and are not stored, except
-    for ``"history"``. Steps are fixed, by ``dt`` and ``steps``, or adaptive, by ``tolerance`` and ``at``. Needs ``pip install
+    for ``"history"``. Steps are fixed, by ``dt`` and ``steps``, or adaptive, by ``tolerance`` and ``at``. Options are
+    the same for all members, and ``dt`` is above zero. In float32 outcomes are computed in float64. Needs ``pip install
     "stepwell[sweep]"``.
 
     Args:
@@ -123,8 +124,7 @@ def sweep(
         chunk: the most members of a chunk; None for as many as ``memory`` allows, up to 16384, or 4194304 with a device.
         memory: the bytes that a chunk may take while it is computed; None for 64 MiB, or 1 GiB with a device, of whose memory it
             takes half at most. As many chunks are computed at once as there are workers.
-        **options: those that go with a sweep, of the table in ``stepwell.runs.options``, the same for all members;
-            ``help(stepwell.sweep)`` shows them.
+        **options: those that go with a sweep, of the table in ``stepwell.runs.options``, which ``help(stepwell.sweep)`` shows.
 
     Returns:
         An ``xarray.Dataset``. Its attributes say how it was made; ``bits`` is a hash of all results.
