@@ -28,27 +28,10 @@ MOST_KEPT = 32
 #: At most so many numbers of an option, or of a start that is a list, are looked at.
 MOST_NUMBERS = 128
 #: The options that short runs, which the core makes with nothing around them, know.
-DONE_BY_THE_CORE = frozenset(
-    [
-        "v",
-        "y",
-        "dt",
-        "steps",
-        "every",
-        "tolerance",
-        "at",
-        "fused",
-        "dtype",
-        "t0",
-        "start",
-        "max_steps",
-        "max_step",
-        "jumps",
-        "threads",
-        "device",
-        "start_step",
-    ]
-)
+DONE_BY_THE_CORE = {
+    *("v", "y", "dt", "steps", "every", "t0", "start", "start_step", "fused", "dtype", "threads", "device"),
+    *("tolerance", "at", "max_steps", "max_step", "jumps"),
+}
 #: Whole numbers up to this one are floats.
 LARGEST_WHOLE = 1 << 53
 
