@@ -151,7 +151,7 @@ class World:
         step = registry.task("watched")(make, loop, request.system, plan.method, plan.dt, v, y, grows)
         object.__setattr__(self, "step", step)
         if request.system.keeper is not None:
-            from .diagnostics import of_a_strong_control
+            from .findings.strong_control import of_a_strong_control
 
             warn_of(of_a_strong_control(request.system, v, y, plan.dt))
 
@@ -169,7 +169,7 @@ class World:
             before, waits = self.t, waits - 1
             diverged = make(n)
             if waits <= 0 and not diverged:
-                from .diagnostics import lost_equations
+                from .findings.algebraic import lost_equations
 
                 waits = pause = min(2 * pause, LOOKS)
                 sizes = np.maximum(np.abs(left), np.abs(y))
@@ -318,7 +318,7 @@ class World:
         if self._live:
             self._watch()
         if system.keeper is not None:
-            from .diagnostics import of_a_strong_control
+            from .findings.strong_control import of_a_strong_control
 
             warn_of(of_a_strong_control(system, self._v, self._y, plan.dt), 4)
 

@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from ...analysis.stiffness import Stiff, course_of, stiff_members
 from ...base import checks
 from ...base.arrays import Array
 from ...errors import ArgumentError, ShapeError, UnsupportedError
@@ -18,14 +17,16 @@ from ...model.systems import System
 from ...reference.acceptance import Acceptance
 from ...runs import engine
 from ...runs.adaptive_options import check_times
-from ...runs.diagnostics import may_be_stiff, why_steps_are_short
 from ...runs.engine import PACE_NUMBERS, WAYPOINTS
+from ...runs.findings.lost_motion import MAX_ABSOLUTE_SHARE, lost_in_tolerance
+from ...runs.findings.stiffness import course_of, may_be_stiff, stiff_members
+from ...runs.findings.stops import why_steps_are_short, why_stopped
 from ...runs.making import step
+from ...runs.noticed import Found as Stiff
 from ...runs.options import Options
 from ...runs.request import Request
 from ...runs.result import Run, Status
-from ...runs.stops import why_stopped
-from ...runs.tolerance import MAX_ABSOLUTE_SHARE, lost_in_tolerance, order_of_series
+from ...runs.tolerance import order_of_series
 from .axes import Grid
 from .exponents import Exponents
 from .observed import Piece
