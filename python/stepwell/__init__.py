@@ -18,7 +18,6 @@ registry.register(
     algebraic_lost="stepwell.analysis.consistency:lost",
     algebraic_rates="stepwell.analysis.consistency:rates",
     algebraic_start="stepwell.analysis.consistency:check_start",
-    amplified_of="stepwell.analysis.amplified:finding_of",
     animate_run="stepwell.views.charts.runs_animation:animate",
     draw_advice="stepwell.views.charts.advice_picture:draw",
     derivatives_of_rates="stepwell.analysis.derivatives.traced:of_rates",
@@ -38,8 +37,7 @@ registry.register(
     draw_verlet_friction="stepwell.views.charts.verlet_friction_picture:draw",
     draw_work_precision="stepwell.views.charts.picture:draw",
     explore="stepwell.views.explorer.page:explore",
-    growth_of="stepwell.analysis.growth:finding_of",
-    held_by_stability="stepwell.analysis.stiffness:held_by_stability",
+    growth_factors="stepwell.analysis.growth:Factors",
     oscillator_limit="stepwell.analysis.stability.kept:oscillator_limit",
     own_method="stepwell.model.own_methods:own_method",
     own_system="stepwell.model.systems.own:OwnSystem",
@@ -48,11 +46,9 @@ registry.register(
     run_to_xarray="stepwell.interop.tables:to_xarray",
     safe_step="stepwell.analysis.stability.nets:safe_step",
     save_run="stepwell.interop.saving:save",
-    state_jump="stepwell.analysis.state_jumps:why_short",
-    state_jump_of="stepwell.analysis.state_jumps:finding_of",
+    stability_function="stepwell.analysis.stability:function",
+    stability_limit="stepwell.analysis.stability:stability_limit",
     states_of_run="stepwell.runs.between:states",
-    stiffness_of="stepwell.analysis.stiffness:finding_of",
-    watched="stepwell.analysis.growth:watched",
 )
 
 __version__: str = _core.__version__

@@ -8,10 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 import stepwell as sw
-from stepwell.analysis import growth
 from stepwell.analysis.stability import limit
 from stepwell.errors import ArgumentError, UnsupportedError
-from stepwell.runs import negative
+from stepwell.runs.findings import growth, negative
 from stepwell.runs.making import noticing, quietly
 from stepwell.runs.options import Options
 from stepwell.runs.request import Request

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 import stepwell as sw
 from stepwell.errors import UnsupportedError
-from stepwell.runs import diagnostics, encounters
+from stepwell.runs import encounters as searches
+from stepwell.runs.findings import encounters, energy
 from support.heard import heard, quiet, told
 
 CHOOSE = [m.name for m in sw.methods() if m.error_order is not None]
@@ -278,10 +279,10 @@ def test_energies_at_both_ends_are_those_of_the_system() -> None:
         for dim in (2, 3):
             bodies = sw.NBody(rng.uniform(0.5, 2.0, 5), force=force, G=1.5, softening=0.2, dim=dim)
             v, y = rng.normal(size=(2, 5, dim))
-            energies = diagnostics._summed(bodies, v.tolist(), y.tolist())
+            energies = energy._summed(bodies, v.tolist(), y.tolist())
             assert np.allclose(energies, (bodies.energy(v, y), bodies.kinetic(v)), rtol=1e-14, atol=1e-13)
     together = [[0.0, 0.0]] * 2
-    assert np.isnan(diagnostics._summed(sw.NBody([1.0, 1.0], force="newton"), together, together)).all()
+    assert np.isnan(energy._summed(sw.NBody([1.0, 1.0], force="newton"), together, together)).all()
 
 
 def test_bodies_in_a_batch_whose_energy_the_method_made() -> None:
@@ -336,7 +337,7 @@ def test_an_energy_that_recovers() -> None:
     through = {"v": np.array([[speed, 0.0], [-speed, 0.0]]), "y": FALL["y"]}
     run, words = integrated(PAIR, "leapfrog", **through, dt=0.01, steps=200)
     changed = abs(run.energy[-1] - PAIR.energy(through["v"], through["y"]))
-    assert changed < diagnostics.DOUBTFUL_CHANGE * speed**2
+    assert changed < energy.DOUBTFUL_CHANGE * speed**2
     assert "another energy" not in words
     assert "bodies 0 and 1 met within step" in words
 
@@ -406,7 +407,7 @@ def test_who_does_not_listen_pays_nothing(monkeypatch: pytest.MonkeyPatch) -> No
     def never(*_: Any, **__: Any) -> Any:
         raise AssertionError
 
-    monkeypatch.setattr(encounters, "met_in", never)
+    monkeypatch.setattr(searches, "met_in", never)
     quiet(sw.integrate, PAIR, "leapfrog", **FALL, dt=0.001, steps=4000)
     with pytest.raises(AssertionError):
         integrated(PAIR, "leapfrog", **FALL, dt=0.001, steps=4000)
@@ -450,12 +451,12 @@ def test_the_look_at_many_bodies_is_little_work(monkeypatch: pytest.MonkeyPatch)
 
 def test_energies_that_are_looked_at_are_those_of_the_system() -> None:
     forces = "newton", "logarithmic", "printed"
-    for n, force, batch in itertools.product((diagnostics.MIN_BODIES_BY_CORE, 65), forces, ((), (3,), (2, 2))):
+    for n, force, batch in itertools.product((energy.MIN_BODIES_BY_CORE, 65), forces, ((), (3,), (2, 2))):
         rng = np.random.default_rng(n)
         bodies = sw.NBody(rng.uniform(0.1, 1.0, size=n), force=force, dim=3, softening=0.05)
         v, y = rng.normal(size=(2, n, 3, *batch))
         run = sw.integrate(bodies, "false_euler", v=v, y=y, dt=1e-3, steps=1)
-        np.testing.assert_array_equal(diagnostics._energies(run, bodies, v, y), bodies.energy(v, y), str((n, force, batch)))
+        np.testing.assert_array_equal(energy._energies(run, bodies, v, y), bodies.energy(v, y), str((n, force, batch)))
 
 
 def test_the_look_ahead_is_right_of_two_bodies() -> None:
@@ -508,9 +509,9 @@ def test_bodies_that_others_pull_apart_are_not_looked_for(monkeypatch):
     for bodies, expected in ((light, True), (heavy, False)):
         assert encounters.may_meet(bodies, 1e-3, 100.0, v.tolist(), y.tolist()) == expected
     runs = []
-    advance = encounters.engine.advance
+    advance = searches.engine.advance
     monkeypatch.setattr(
-        encounters.engine, "advance", lambda *arguments, **options: runs.append(1) or advance(*arguments, **options)
+        searches.engine, "advance", lambda *arguments, **options: runs.append(1) or advance(*arguments, **options)
     )
     sw.integrate(scene.system, "leapfrog", v=scene.v, y=scene.y, dt=6.3e-4, steps=20_000)
     assert len(runs) == 1

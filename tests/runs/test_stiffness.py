@@ -13,11 +13,11 @@ from typing import Any
 import numpy as np
 import pytest
 import stepwell as sw
-from stepwell.analysis import stiffness
 from stepwell.model import methods as all_methods
 from stepwell.model.methods import for_stiff
 from stepwell.runs import engine
 from stepwell.runs.adaptive import adaptive_run
+from stepwell.runs.findings import stiffness
 from stepwell.runs.making import quietly
 from stepwell.runs.options import Options
 from stepwell.runs.request import Request

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 import stepwell as sw
-from stepwell.analysis.stiffness import limit_of
+from stepwell.runs.findings.stiffness import limit_of
 from stepwell.scenes.base import LEAST_SCALE
 from stepwell.scenes.truth import METHOD, METHOD_IF_STIFF, method_for, with_truth
 from stepwell.views.charts.panel_picture import _blows_up

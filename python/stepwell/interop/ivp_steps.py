@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from ..analysis.stiffness import HELD_DOWN, Course, stiff_members, suspects
 from ..base import checks
 from ..base.arrays import Array, Whole
 from ..errors import ArgumentError, ShapeError
@@ -15,7 +14,7 @@ from ..reference import adaptive
 from ..runs import engine
 from ..runs.adaptive import of_extra_steps, paces_of
 from ..runs.between import reach_of, within_steps
-from ..runs.diagnostics import may_be_stiff
+from ..runs.findings.stiffness import HELD_DOWN, Course, may_be_stiff, stiff_members, suspects
 from ..runs.request import Request
 
 #: The most attempts at steps in one run: up to here the counts of the step-size controller are exact.

@@ -8,7 +8,7 @@ from typing import Any
 from ..base.arrays import Array
 from ..model.methods import Method
 from ..model.systems import System
-from .diagnostics import findings_of
+from .findings import findings_of
 from .fixed import fixed_run
 from .options import Options
 from .request import Request

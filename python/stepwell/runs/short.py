@@ -10,8 +10,7 @@ import numpy as np
 from ..base import checks
 from ..base.arrays import Array
 from ..model.systems import System
-from .diagnostics import findings_of
-from .findings import is_heard
+from .findings import findings_of, is_heard
 from .options.parts import block_like
 from .request import Request
 from .result import Run

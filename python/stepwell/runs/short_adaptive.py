@@ -12,10 +12,11 @@ from ..base.arrays import Array, Shape
 from ..base.immutable import changed
 from ..model.methods import method
 from ..model.systems import NBody, System
-from . import engine, known_energy
+from . import engine
 from .adaptive import of_extra_steps, paces_of, run_of
-from .diagnostics import MANY
-from .options.tolerance import lost_in_tolerance
+from .findings import MANY
+from .findings.invariants import LITTLE, judged_by_change, keeps_energy
+from .findings.lost_motion import lost_in_tolerance
 from .request import Request
 from .result import AdaptiveState, Run
 from .short import NOT_MADE, TAME, ShortRun
@@ -30,7 +31,7 @@ class ShortAdaptiveRun(ShortRun):
         assert control is not None
         times, shape_of_paces = len(control.times), (engine.pace_numbers(plan), *plan.batch)
         self.core = core
-        self.keeps_energy = known_energy.keeps_energy(request.system, None)
+        self.keeps_energy = keeps_energy(request.system, None)
         self.shapes = (times, *request.v.shape), (times, *request.y.shape), request.v.shape, request.y.shape, shape_of_paces
         self.evaluations = engine.evaluations_of_attempt(plan)
         self.of_extra = of_extra_steps(plan, self.evaluations, dense=times > 1 or not control.pacing.begins)
@@ -57,7 +58,7 @@ class ShortAdaptiveRun(ShortRun):
         return True
 
     def _made(self, v: Any, y: Any, system: System, numbers: list[Array] | None) -> Run | None:
-        if known_energy.keeps_energy(system, None) != self.keeps_energy:  # damping may be zero in one of them
+        if keeps_energy(system, None) != self.keeps_energy:  # damping may be zero in one of them
             return None
         if not self.attributes and not self.begin(v, y, numbers):
             return None
@@ -88,7 +89,7 @@ def short_adaptive_run(own: System, request: Request, shapes: tuple[Shape, Shape
     assert control is not None
     if control.every is not None or control.t0.ndim or control.times.ndim > 1 or plan.single:
         return None
-    names, quantities = known_energy.judged_by_change(system, plan.force), None
+    names, quantities = judged_by_change(system, plan.force), None
     if names and not isinstance(system, NBody):
         alone = changed(system.uncontrolled, around=())  # no step is made, so any method will do
         quantities = engine.model(engine.Plan(alone, method("false_euler"), plan.batch, 1.0, record=tuple(names)))
@@ -103,7 +104,7 @@ def short_adaptive_run(own: System, request: Request, shapes: tuple[Shape, Shape
         plan.members,
         quantities=quantities,
         has_amounts=not numbers[0] and bool(system.groups) and not plan.backward,
-        least_change=known_energy.LITTLE,
+        least_change=LITTLE,
         many=MANY,
     )
     if core is None:

@@ -12,8 +12,7 @@ from ..base.arrays import Array, Shape
 from ..model.methods import Method
 from ..model.systems import NBody, System
 from . import engine
-from .diagnostics import finds_growth_only
-from .findings import may_have_amounts
+from .findings import finds_growth_only, may_have_amounts
 from .fixed import fixed_run
 from .options import Options
 from .options.checked import asked_for, fixed

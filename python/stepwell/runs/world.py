@@ -20,6 +20,7 @@ from ..model.systems import System
 from . import engine, float32
 from .continuation import Continuation, bits_of_parameters
 from .findings import warn_of
+from .findings.watched import watched
 from .live import LARGEST, PLAIN, Live, Parameters, members_at
 from .options import named, with_options
 from .options.parts import controlled
@@ -110,10 +111,10 @@ class World:
         if request.system.mass_matrix is not None:
             make = self._holding(make, y)
         #: ``step(n=1)`` makes n steps in place.
-        step = registry.task("watched")(make, loop, request.system, plan.method, plan.dt, v, y, grows)
+        step = watched(make, loop, request.system, plan.method, plan.dt, v, y, grows)
         object.__setattr__(self, "step", step)
         if request.system.keeper is not None:
-            from .diagnostics import of_a_strong_control
+            from .findings.strong_control import of_a_strong_control
 
             warn_of(of_a_strong_control(request.system, v, y, plan.dt))
 
@@ -131,7 +132,7 @@ class World:
             before, waits = self.t, waits - 1
             diverged = make(n)
             if waits <= 0 and not diverged:
-                from .diagnostics import lost_equations
+                from .findings.algebraic import lost_equations
 
                 waits = pause = min(2 * pause, LOOKS)
                 sizes = np.maximum(np.abs(left), np.abs(y))
@@ -280,7 +281,7 @@ class World:
         if self._live:
             self._watch()
         if system.keeper is not None:
-            from .diagnostics import of_a_strong_control
+            from .findings.strong_control import of_a_strong_control
 
             warn_of(of_a_strong_control(system, self._v, self._y, plan.dt), 4)
 

@@ -26,7 +26,7 @@ const MOST_CHECKS: i64 = 4;
 /// Other threads of Python go on meanwhile from so many steps of numbers on: to let them takes longer than a shorter run.
 const FEW_NUMBER_STEPS: f64 = 1e4;
 /// How much longer than the start of the shortest member all numbers at the end may be in all, squared, so that no member has
-/// grown as `analysis/growth.py` means it, with room for the rounding of sums.
+/// grown as `runs/findings/growth.py` means it, with room for the rounding of sums.
 const TAME: f64 = 1e11;
 /// Squares below this are too small to be compared.
 const LEAST_SQUARE: f64 = 1e-270;

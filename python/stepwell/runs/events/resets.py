@@ -7,10 +7,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ...base.arrays import Array, Whole
-from ...base.reprs import first_of, share
 from ...errors import EventWarning
 from ...reference.events import located
-from ..findings import Finding
+from ..noticed import Finding, named
 from .collected import AT_START, Collected
 from .parts import Changes, Located, is_no_time
 from .traced import NewState
@@ -507,7 +506,7 @@ class Resets:
         """A finding of members at rest: each one's event by its number, −1 for others, and since when."""
         batch, is_at_rest = self._run.plan.batch, (rests >= 0).reshape(self._run.plan.batch)
         first = int(np.argmin(np.where(rests >= 0, self._way * times, np.inf)))
-        some, place = int(is_at_rest.sum()), tuple(int(i) for i in np.unravel_index(first, batch)) if batch else ()
+        who = named(is_at_rest, tuple(map(int, np.unravel_index(first, batch))) if batch else ())
         if self.circles[:, first].any():
             names = ", ".join(each.name for each, acts in zip(self._run.events, self.circles[:, first], strict=True) if acts)
             why = f"events {names} set each other off at this instant, again and again"
@@ -519,8 +518,6 @@ class Resets:
             why = "its change of the state leads back onto it, and the motion across it, so that it does not go on"
         else:
             why = "changes of its state follow each other within no time, so that it does not go on by them"
-        text = (
-            f"{share(some, batch, is_at_rest.size)} came to rest at event {self._run.events[rests[first]].name}"
-            f"{first_of(some, place, is_at_rest.size) or ','} at t = {self._run.sign * times[first]:.9g}: {why}"
-        )
+        text = f"{who.share} came to rest at event {self._run.events[rests[first]].name}{who.first or ','}"
+        text += f" at t = {self._run.sign * times[first]:.9g}: {why}"
         return Finding(EventWarning, text, is_at_rest)

@@ -15,9 +15,6 @@ from ...model.systems import System
 from ...reference.acceptance import Acceptance
 from .. import engine
 
-#: An absolute tolerance above this fraction of the largest length of a block so far gives a warning.
-MAX_ABSOLUTE_SHARE = 0.01
-
 
 def tolerances_of(tolerance: Any, system: System, acceptance: Acceptance, batch: Shape) -> engine.Tolerances:
     """The relative one, and the absolute one of a pair: numbers over the batch, or of each component along the first axis."""
@@ -98,14 +95,3 @@ def order_of_series(method: Method, relative: Array) -> int:
             f"{least:g} (order {order}) to {most:g} (order {series_pace.order_of(most)}); make a run for each"
         )
     return order
-
-
-def lost_in_tolerance(paces: Array, groups: int) -> np.ndarray[Any, np.dtype[np.bool_]]:
-    """Members whose absolute tolerance is most of the tolerated error, and much of the motion itself, shape (*batch).
-
-    ``paces`` are their step-size controllers. The motion is measured by the largest length of a group so far.
-    """
-    absolute, relative = paces[engine.ABSOLUTE], paces[engine.RELATIVE]
-    longest = paces[engine.PACE_NUMBERS : engine.PACE_NUMBERS + groups].max(axis=0, initial=0.0)
-    lost = (longest > 0.0) & (absolute > relative * longest) & (absolute > MAX_ABSOLUTE_SHARE * longest)
-    return np.asarray(lost, dtype=bool)

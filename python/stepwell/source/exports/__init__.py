@@ -19,8 +19,8 @@ from ...model.methods import of_operations as find_method
 from ...model.systems import System
 from ...model.systems.base import a_system
 from ...runs import float32
-from ...runs.diagnostics import of_a_strong_control
 from ...runs.findings import warn_of
+from ...runs.findings.strong_control import of_a_strong_control
 from ...runs.options import Options
 from ...runs.request import Request
 from .c import C

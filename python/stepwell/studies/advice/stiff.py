@@ -6,10 +6,10 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from ...analysis.stability import function
-from ...analysis.stiffness import STIFF, limit_of
 from ...base.reprs import one_line
 from ...errors import UnsupportedError
 from ...model.methods import Method
+from ...runs.findings.stiffness import STIFF, limit_of
 from .predict import Rates
 
 

@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from ...analysis.stiffness import Stiff, course_of, stiff_members
 from ...base import checks
 from ...base.arrays import Array
 from ...errors import ArgumentError, ShapeError, UnsupportedError
@@ -18,15 +17,17 @@ from ...model.systems import System
 from ...reference.acceptance import Acceptance
 from ...runs import engine
 from ...runs.adaptive_options import check_times
-from ...runs.diagnostics import may_be_stiff, why_steps_are_short
 from ...runs.engine import PACE_NUMBERS, WAYPOINTS
+from ...runs.findings.lost_motion import lost_in_tolerance
+from ...runs.findings.stiffness import course_of, may_be_stiff, stiff_members
+from ...runs.findings.stops import why_steps_are_short, why_stopped
 from ...runs.making import step
+from ...runs.noticed import Found
 from ...runs.options import Options
 from ...runs.options.checked import Checked
-from ...runs.options.tolerance import MAX_ABSOLUTE_SHARE, lost_in_tolerance, order_of_series
+from ...runs.options.tolerance import order_of_series
 from ...runs.request import Request
 from ...runs.result import Run, Status
-from ...runs.stops import why_stopped
 from .axes import Grid
 from .exponents import Exponents
 from .observed import Piece
@@ -187,7 +188,7 @@ class Pieces:
         """The plan of the last piece."""
         return None if self._last is None else self._last[1].plan
 
-    def stiff(self) -> Stiff | None:
+    def stiff(self) -> Found | None:
         """The members whose steps stability held down, and not the tolerance, or None."""
         if self._last is None or self._waypoints is None:
             return None
@@ -206,10 +207,3 @@ class Pieces:
             return ""
         waypoints = [] if self._waypoints is None else [self._waypoints]
         return why_stopped(run, (int(stopped[0]),), partial(why_steps_are_short, run, request, waypoints))
-
-
-#: The warning for members whose motion is lost in the absolute tolerance.
-LOST = (
-    f"tolerance: for {{lost}} of {{members}} the absolute part lets a step err by more than {MAX_ABSOLUTE_SHARE:g} of the "
-    f"longest that v or y has been; give one number, which goes by these lengths, or a smaller absolute part"
-)

@@ -11,8 +11,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...analysis.growth import Growth
-from ...analysis.stiffness import HELD_DOWN, Stiff
 from ...base import checks
 from ...base.reprs import counted
 from ...errors import (
@@ -29,7 +27,8 @@ from ...model.methods import method as find_method
 from ...model.systems import System
 from ...runs import float32
 from ...runs.findings import is_heard, warn_of
-from ...runs.negative import Negative
+from ...runs.findings.lost_motion import LOST
+from ...runs.noticed import Found
 from ...runs.options import OPTIONS, named, with_options
 from ...runs.options.checked import Checked
 from . import adaptive, happenings, lengths
@@ -372,9 +371,8 @@ class _Tally:
         self.grid, self.task, self.bad, self.members, self.first, self.step = grid, task, 0, 0, grid.members, -1
         self.lost, self.why = 0, ""
         self.doubts: dict[int, str] = {}
-        self.growths: dict[int, Growth] = {}
-        self.stiff: dict[int, Stiff] = {}
-        self.amounts: dict[int, Negative] = {}
+        #: By the first members of their chunks.
+        self.found: dict[str, dict[int, Found]] = {"stiff": {}, "growth": {}, "amounts": {}}
 
     def add(self, chunk: Chunk, done: Done) -> None:
         status = np.where(np.isin(done.results["status"].values, happenings.EVENTS), 0, done.results["status"].values)
@@ -388,57 +386,40 @@ class _Tally:
         self.lost += done.lost
         if done.doubt is not None:
             self.doubts[chunk.first] = done.doubt
-        if done.growth is not None:
-            self.growths[chunk.first] = done.growth
-        if done.stiff is not None:
-            self.stiff[chunk.first] = done.stiff
-        if done.amounts is not None:
-            self.amounts[chunk.first] = done.amounts
+        for name, found in done.found.items():
+            if found is not None:
+                self.found[name][chunk.first] = found
 
     def warn(self) -> None:
+        for category, text in self._warnings():
+            warnings.warn(text, category, stacklevel=4)
+
+    def _warnings(self) -> Iterator[tuple[type[Warning], str]]:
         if self.bad and self.task.at is not None:
-            warnings.warn(
-                f"{self.bad} of {counted(self.members, 'member')} stopped before t = {self.task.at[-1]:g}, "
-                f"{'the first of them' if self.bad > 1 else 'that'} at {self.grid.place(self.first)}: "
-                f"{self.why}; status tells which and why",
-                ToleranceWarning,
-                stacklevel=4,
-            )
+            stopped = f"{self._share(self.bad)} stopped before t = {self.task.at[-1]:g}{self._first(self.bad, self.first)}"
+            yield ToleranceWarning, f"{stopped}: {self.why}; status tells which and why"
         elif self.bad:
-            warnings.warn(
-                f"{self.bad} of {counted(self.members, 'member')} diverged, {'the first of them' if self.bad > 1 else 'that'} at "
-                f"{self.grid.place(self.first)}, at step {self.step}; status and first_bad_step tell which and when",
-                DivergenceWarning,
-                stacklevel=4,
-            )
-        if self.stiff:
-            chunk, number = min(self.stiff), sum(each.number for each in self.stiff.values())
-            first = self.stiff[chunk]
-            warnings.warn(
-                f"{HELD_DOWN} {number} of {counted(self.members, 'member')}, {'the first of them' if number > 1 else 'that'} at "
-                f"{self.grid.place(chunk + first.first[0])}: {first.why}",
-                StiffnessWarning,
-                stacklevel=4,
-            )
+            diverged = f"{self._share(self.bad)} diverged{self._first(self.bad, self.first)}, at step {self.step}"
+            yield DivergenceWarning, f"{diverged}; status and first_bad_step tell which and when"
+        yield from self._sentence("stiff")
         if self.lost:
-            warnings.warn(
-                adaptive.LOST.format(lost=self.lost, members=counted(self.members, "member")), ToleranceWarning, stacklevel=4
-            )
+            yield ToleranceWarning, LOST.format(who=self._share(self.lost))
         if self.doubts:
             chunk = min(self.doubts)
-            warnings.warn(
-                f"in {counted(len(self.doubts), 'chunk')}, the first beginning at {self.grid.place(chunk)}: {self.doubts[chunk]}",
-                AccuracyWarning,
-                stacklevel=4,
-            )
-        grew, ended = "{number} of {members} {size}, {which} at", "{size} in {number} of {members}, {which} at"
-        whose = f"{grew} {{place}}: {{why}}", f"{ended} {{place}}, {{why}}"
-        noticed: tuple[dict[int, Any], ...] = self.growths, self.amounts
-        for text, each in zip(whose, noticed, strict=True):
-            if not each:
-                continue
-            chunk, number = min(each), sum(one.number for one in each.values())
-            first, which = each[chunk], "the first of them" if number > 1 else "that"
-            place, members = self.grid.place(chunk + first.first[0]), counted(self.members, "member")
-            text = text.format(number=number, members=members, size=first.size, which=which, place=place, why=first.why)
-            warnings.warn(text, AccuracyWarning, stacklevel=4)
+            where = f"in {counted(len(self.doubts), 'chunk')}, the first beginning at {self.grid.place(chunk)}"
+            yield AccuracyWarning, f"{where}: {self.doubts[chunk]}"
+        yield from self._sentence("growth")
+        yield from self._sentence("amounts")
+
+    def _sentence(self, name: str) -> Iterator[tuple[type[Warning], str]]:
+        if found := self.found[name]:
+            chunk, some = min(found), sum(len(each.members) for each in found.values())
+            first = found[chunk]
+            which = self._first(some, chunk + int(first.members[0]))
+            yield first.category, first.sentence(self._share(some), which)
+
+    def _share(self, some: int) -> str:
+        return f"{some} of {counted(self.members, 'member')}"
+
+    def _first(self, some: int, member: int) -> str:
+        return f", {'the first of them' if some > 1 else 'that'} at {self.grid.place(member)}"

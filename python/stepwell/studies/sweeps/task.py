@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from functools import partial
 from math import gcd, prod
@@ -11,9 +11,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from ... import _core
-from ...analysis import growth as _growth
-from ...analysis.growth import Growth
-from ...analysis.stiffness import Stiff
 from ...base import checks
 from ...base.arrays import Array
 from ...errors import ShapeError, UnsupportedError
@@ -21,11 +18,15 @@ from ...model.compatibility import velocities
 from ...model.methods import Method
 from ...model.systems import System
 from ...model.systems.base import a_system
-from ...runs import engine, known_energy
-from ...runs.diagnostics import lost_equations, of_a_strong_control
-from ...runs.findings import Finding
+from ...runs import engine
+from ...runs.findings import may_gain
+from ...runs.findings.algebraic import lost_equations
+from ...runs.findings.gain import gain_of
+from ...runs.findings.growth import of_last_piece
+from ...runs.findings.negative import of_a_run
+from ...runs.findings.strong_control import of_a_strong_control
 from ...runs.making import quietly, step
-from ...runs.negative import Negative, of_a_run
+from ...runs.noticed import Finding, Found
 from ...runs.options import OPTIONS, Options
 from ...runs.options.parts import spread
 from ...runs.request import Request
@@ -155,19 +156,16 @@ class Done(NamedTuple):
         results: by name, values of shape (*own axes, members).
         doubt: a message if the numbers are finite but meaningless, or None.
         lost: the number of members whose absolute tolerance is so large that the motion is lost in it.
-        growth: the members that grew by fixed steps beyond their stability limit, or None.
-        stiff: the members whose adaptive steps stability held down, or None.
-        amounts: the members that ended at a negative amount, which no solution reaches, or None.
+        found: the members whose adaptive steps stability held down, "stiff"; that grew by fixed steps beyond their stability
+            limit, "growth"; and that ended at a negative amount, which no solution reaches, "amounts".
         why_stopped: why the first member stopped before the last time, or "".
     """
 
     results: Results
     doubt: str | None
-    lost: int = 0
-    growth: Growth | None = None
-    stiff: Stiff | None = None
-    amounts: Negative | None = None
-    why_stopped: str = ""
+    lost: int
+    found: Mapping[str, Found | None]
+    why_stopped: str
 
 
 def prepared(task: Task, values: dict[str, Any]) -> tuple[System, dict[str, Any]]:
@@ -217,17 +215,17 @@ def run(task: Task, values: dict[str, Any], members: int, stopped: Callable[[], 
     bad = Variable((), np.array(last.first_bad_step, dtype=np.int64), about)
     parts.append({"status": status, "first_bad_step": bad})
     grown, amounts, gained = _alone(task, options, last, pieces)
-    doubt = last.system.doubt(last.y) or gained
+    doubt = (last.system.doubt(last.y) or (gained,))[0]
     if task.at is None and last.system.mass_matrix is not None:
         end = last.y[-1], last.t[-1]
         found = lost_equations(last, end, end, np.abs(last.y).max(axis=0), last.status == 0)
-        doubt = found[0][1:] if found else None
+        doubt = found[0].message if found else None
     stiff, why = (None, "") if task.at is None else (pieces.stiff(), pieces.why_stopped())
-    return Done(together(parts), None if doubt is None else doubt[0], lost(last), grown, stiff, amounts, why)
+    return Done(together(parts), doubt, lost(last), {"stiff": stiff, "growth": grown, "amounts": amounts}, why)
 
 
-def _alone(task: Task, options: dict[str, Any], last: Run, pieces: Pieces) -> tuple[Growth | None, Negative | None, Any]:
-    """The members that by steps alone grew, became negative, and gained energy, from the start of the sweep to its end."""
+def _alone(task: Task, options: dict[str, Any], last: Run, pieces: Pieces) -> tuple[Found | None, Found | None, str | None]:
+    """The members that by steps alone grew and became negative from the start of the sweep to its end; if any gained energy."""
     if any(event.then for event in options.get("events", ())):
         return None, None, None  # events may change states, so these say nothing about the steps
     system, batch = last.system, last.status.shape
@@ -236,8 +234,9 @@ def _alone(task: Task, options: dict[str, Any], last: Run, pieces: Pieces) -> tu
     if task.at is not None:
         return None, of_a_run(last, y, pieces.plan), None
     steps = task.transient + task.steps
-    grown, gains = _growth.of_last_piece(last, (v, y), steps), known_energy.may_gain(system, task.method, steps)
-    return grown, of_a_run(last, y) if grown is None else None, known_energy.gain_of(last, (v, y)) if gains else None
+    grown = of_last_piece(last, (v, y), steps)
+    gained = gain_of(last, (v, y)) if may_gain(system, task.method, steps) else None
+    return grown, of_a_run(last, y) if grown is None else None, None if gained is None else gained.message
 
 
 def _reduced(

@@ -2,34 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
 from math import pi, prod
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
-from ..base import registry
-from ..base.arrays import Array, Shape, Whole
-from ..base.reprs import in_words, share
-from ..errors import AccuracyWarning
-from ..model.methods import Method
-from ..model.systems import Pendulum, RigidBody, Springs, System
-from ..reference.acceptance import Acceptance
-from .engine import ABSOLUTE, PACE_NUMBERS, RELATIVE, own_tolerances
-from .result import Run
+from ...base import registry
+from ...base.arrays import Array, Shape
+from ...base.reprs import in_words
+from ...errors import AccuracyWarning
+from ...model.systems import Pendulum, RigidBody, System
+from ...reference.acceptance import Acceptance
+from ..engine import ABSOLUTE, PACE_NUMBERS, RELATIVE, own_tolerances
+from ..noticed import Finding, named
+from ..result import Run
+from . import FEW_EVALUATIONS, KERNEL_OF_EQUATIONS, Case, State, another, evaluations_of, may_pass_barriers
 
-State = tuple[Array, Array]
-#: From the places of members in one row to the least and the most y of each, and how many attempts were rejected.
-Visited = Callable[[Whole], tuple[Array, Array, Array]]
-#: The name of the core's kernel for own equations.
-KERNEL_OF_EQUATIONS = "equations"
-Members = np.ndarray[Any, np.dtype[np.bool_]]
 #: A message, and the members that it is about.
-About = tuple[str, Members]
+About = tuple[str, np.ndarray[Any, np.dtype[np.bool_]]]
 
-#: A run is checked only if it made this many function evaluations and has at most this many numbers, so that checking is little
-#: work beside it.
-FEW_EVALUATIONS, MOST_NUMBERS = 100, 100_000
+#: A run is checked only if it has at most this many numbers, so that checking is little work beside it.
+MOST_NUMBERS = 100_000
 #: An invariant has changed if its change is more than this share of the size of its terms, and more than this share either of
 #: what its terms exchange in the motion, such as the kinetic energy of a swing, or of its own size; in the last case also more
 #: than CHANGED_OF_SLOPE of its slope times the length of the state, since terms may cancel. The first two sizes do not depend on
@@ -38,8 +31,6 @@ FEW_EVALUATIONS, MOST_NUMBERS = 100, 100_000
 #: Changes below LITTLE of its own size are not checked, which takes a hundred microseconds: they would count only if a constant
 #: of a thousand times what is exchanged was added.
 CHANGED, CHANGED_OF_SLOPE, LITTLE = 0.5, 0.25, 2.0**-10
-#: The same of a world, over what moved at the start: what is written into its arrays may add energy, too, but not so much.
-GAINED = 1e4
 #: The share in place of CHANGED of what algebraic equations keep: they have lost the constraint of which they are the derivative.
 DRIFTED = 0.1
 #: The steps of a way on which such an invariant is looked at.
@@ -72,58 +63,6 @@ def keeps_energy(system: System, force: Array | None) -> bool:
     return isinstance(system, RigidBody) or not system.given_inputs()
 
 
-def may_pass_barriers(system: System, method: Method, steps: int) -> bool:
-    """True if a run of fixed steps may pass a barrier, and is long enough to look for that; most systems have none."""
-    has_barriers = isinstance(system, Pendulum) or system.kernel == KERNEL_OF_EQUATIONS
-    return method.limit != 0.0 and has_barriers and method.evaluations * steps >= FEW_EVALUATIONS
-
-
-def may_gain(system: System, method: Method, steps: int) -> bool:
-    """True if a run of fixed steps is one of a net, to whose energy nothing but an error adds, long enough to check that."""
-    return isinstance(system, Springs) and system.keeper is None and method.evaluations * steps >= FEW_EVALUATIONS
-
-
-def gain_of(run: Run, start: State) -> About | None:
-    """Members of a run of a net that gained energy in fixed steps."""
-    if run.force is not None or not run.status.size or run.y[-1].size > MOST_NUMBERS:
-        return None
-    saved = slice(-1, None) if run.y.size > MOST_NUMBERS else slice(None)
-    return gain(run, [(np.broadcast_to(b, a.shape[1:]), *a[saved]) for a, b in zip((run.v, run.y), start, strict=True)], CHANGED)
-
-
-def gain(of: Any, blocks: Sequence[Sequence[Array]], least: float) -> About | None:
-    """Members of a net that gained energy in fixed steps; surfaces, damping and drag only take it.
-
-    ``of`` has their system, method and dt; ``blocks`` are v and y of some states, the first of them that of the start; ``least``
-    is the least gain that counts, over the energies that there were.
-    """
-    system: Springs = of.system
-    v, y = (np.stack(block, axis=2) for block in blocks)
-    if system.given_inputs() or v[system.fixed, :, 0].any():
-        return None
-    with np.errstate(all="ignore"):
-        alone = system.reference_at_step(1.0, y.shape[2:])
-        kinetic, energy = alone.kinetic_and_whole(v, y)
-        first, most = energy[0], energy.max(axis=0)
-        known = kinetic.max(axis=0) if least < 1.0 else kinetic[0]
-        if not (most - first > least * known).any():  # which spares the rest, for nearly all runs
-            return None
-        moved = (y.max(axis=(0, 2)) - y.min(axis=(0, 2))).max(axis=0)
-        weight = np.broadcast_to(alone.masses, (system.n, *alone.masses.shape[1:])).sum(axis=0)
-        pull = 0.0 if alone.fall is None else (weight * np.sqrt((alone.fall * alone.fall).sum(axis=0)))[0]
-        stretched = (0.5 * alone.stiffness * alone.stretches(y[:, :, :1]) ** 2).sum(axis=0)[0]
-        wrong = np.asarray((most - first > least * np.maximum(known, stretched + pull * moved)) & np.isfinite(most))
-    if not wrong.any():
-        return None
-    index, some = tuple(np.argwhere(wrong)[0].tolist()), int(np.count_nonzero(wrong))
-    text = (
-        f"{share(some, wrong.shape, wrong.size)} gained energy, which springs and surfaces never give: "
-        f"{f'{in_words(index)} has ' if wrong.size > 1 else ''}up to {most[index]:.3g} from {first[index]:.3g}, so "
-        f"{of.method.name} with dt = {of.dt:g} did not follow the motion; take shorter steps"
-    )
-    return text, wrong
-
-
 def judged_by_change(system: System, force: Array | None) -> list[str] | None:
     """The invariants by whose change a run of adaptive steps is judged; None if it is judged by more than that.
 
@@ -134,32 +73,34 @@ def judged_by_change(system: System, force: Array | None) -> list[str] | None:
     return None if _has_barriers(system) else names
 
 
-def doubt_of(run: Run, start: State, visited: Visited | None, heard: Callable[[type[Warning]], bool]) -> About | None:
-    """The evidence that members did not follow the motion, and which members; None without any.
+def of_run(case: Case) -> Finding | None:
+    """The members of a run that say themselves that they mean nothing, or did not follow the motion by what it keeps."""
+    about = case.run.system.doubt(case.run.y)
+    if about is None and case.start is not None:
+        about = _doubt_of(case, case.start)
+    return None if about is None else Finding(AccuracyWarning, *about)
+
+
+def _doubt_of(case: Case, start: State) -> About | None:
+    """The evidence that members did not follow the motion from this start, and which members; None without any.
 
     With steps of fixed length the method itself makes the energy grow or decay. There only a passed barrier counts, with a method
     that keeps swings bounded, and what algebraic equations keep.
-
-    Args:
-        run: the run.
-        start: velocities and coordinates at its start, spread over the batch.
-        visited: between which y some members have been at the ends of adaptive steps, by their places.
-        heard: whether a warning would be shown.
     """
-    system, paces = run.system, run.paces
-    if paces is None and not may_pass_barriers(system, run.method, run.steps):
+    run, system = case.run, case.run.system
+    if run.paces is None and not may_pass_barriers(system, run.method, run.steps):
         return None
     if system.keeper is not None or not (names := _names(system)) or not run.status.size:
         return None
-    evaluations = run.method.evaluations * run.steps if paces is None else int(paces.evaluations.min(initial=2**62))
+    evaluations = evaluations_of(run)
     if evaluations < FEW_EVALUATIONS or run.v[-1].size + run.y[-1].size > MOST_NUMBERS:
         return None
-    if not keeps_energy(system, run.force) or not heard(AccuracyWarning):
+    if not keeps_energy(system, run.force) or not case.heard(AccuracyWarning):
         return None
     start = np.broadcast_to(start[0], run.v.shape[1:]), np.broadcast_to(start[1], run.y.shape[1:])
     with np.errstate(all="ignore"):
         for name in names:
-            about = _of_one(run, name, start, evaluations, visited)
+            about = _of_one(case, name, start, evaluations)
             # An invariant may be declared only to be recorded, such as the energy of a damped or driven system.
             if about is not None and (system.kernel != KERNEL_OF_EQUATIONS or _is_constant(run, name, start)):
                 return about
@@ -187,8 +128,7 @@ def _is_constant(run: Run, name: str, start: State) -> bool:
     changes = []
     for by_v, by_y in ((time, 0.0), (0.0, time)):
         ends = [(v + sign * by_v * rates[0], y + sign * by_y * rates[1]) for sign in (1.0, -1.0)]
-        pairs = (np.stack([end[i] for end in ends], axis=len(axes[i])) for i in range(2))
-        later, earlier = _values(system, name, tuple(pairs))  # type: ignore[arg-type]  # v and y
+        later, earlier = _of_several(system, name, ends)
         changes.append(later - earlier)
     constant = np.abs(changes[0] + changes[1]) <= CONSTANT * (np.abs(changes[0]) + np.abs(changes[1]))
     return bool((constant | ~np.isfinite(changes[0] + changes[1])).all())
@@ -220,9 +160,9 @@ def _is_constant_at_first(run: Run, name: str, start: State) -> bool:
     return _cancels(system, name, y, rates(system, y, t, h))
 
 
-def _of_one(run: Run, name: str, start: State, evaluations: int, visited: Visited | None) -> About | None:
+def _of_one(case: Case, name: str, start: State, evaluations: int) -> About | None:
     """The evidence of one invariant. States are evaluated together, since a call takes longer than a thousand numbers."""
-    system = run.system
+    run, system = case.run, case.run.system
     # Of few members it takes some tenths of a millisecond; else a place takes as long as some hundred evaluations of the core.
     few = run.status.size * PLACES <= MOST_NUMBERS // 10
     places = PLACES if few else min(PLACES, MOST_NUMBERS // run.status.size, evaluations // 100)
@@ -230,10 +170,10 @@ def _of_one(run: Run, name: str, start: State, evaluations: int, visited: Visite
     has_equations = system.mass_matrix is not None
     if not has_barriers and run.paces is None and not has_equations:
         return None
-    region = None if not has_barriers else _saved(run, start) if run.paces is None else _farthest(run)
+    region = _region(run, start) if has_barriers else None
     first, last, above = _looked_over(run, name, start, region, places)
     if region is not None and (above < np.inf).any():
-        between = region if run.paces is None else _stepped(run, name, start, above, visited)
+        between = region if run.paces is None else _stepped(case, name, start, above)
         if between is not None:
             barrier = (
                 _upright(run, between) if isinstance(system, Pendulum) else _searched(run, name, start, first, between, places)
@@ -245,16 +185,16 @@ def _of_one(run: Run, name: str, start: State, evaluations: int, visited: Visite
 
 def _looked_over(run: Run, name: str, start: State, region: State | None, places: int) -> tuple[Array, Array, Array]:
     """An invariant at the start and at the end, and how far the lowest barrier of a region above the first is above it."""
-    system, ends = run.system, _ends(run, start)
-    if region is None:
-        first, last = _values(system, name, ends)
-        return first, last, np.full(run.status.shape, np.inf)
-    if isinstance(system, Pendulum):
-        first, last = _values(system, name, ends)
-        heights = _upright(run, region).height[np.newaxis]
+    system, end = run.system, _end(run)
+    if region is None or isinstance(system, Pendulum):
+        first, last = _of_several(system, name, [start, end])
+        if region is None:
+            return first, last, np.full(run.status.shape, np.inf)
+        heights = _upright(run, region)[1][np.newaxis]
     else:
         y = _between(*region, places)
-        first, last, *_ = values = _values(system, name, (np.concatenate([ends[0], 0.0 * y]), np.concatenate([ends[1], y])))
+        v, y = (np.concatenate([np.stack(pair), more]) for *pair, more in zip(start, end, (0.0 * y, y), strict=True))
+        first, last, *_ = values = _values(system, name, (v, y))
         heights = np.where(np.isfinite(values[2:]), values[2:], -np.inf)
         top, *beside = heights[1:-1], heights[:-2], heights[2:]
         # Between places it is higher by no more than it falls beside.
@@ -263,17 +203,9 @@ def _looked_over(run: Run, name: str, start: State, region: State | None, places
 
 
 def _names(system: System) -> list[str]:
-    """The names of its invariants."""
     if system.kernel == KERNEL_OF_EQUATIONS:
         return list(system.quantities)
     return ["energy"] if "energy" in system.quantities else []
-
-
-def _ends(run: Run, start: State) -> State:
-    """The states at the start and at the end, along an axis before those of the batch."""
-    pairs = zip(start, (run.v[-1], run.y[-1]), (run.system.v_shape, run.system.y_shape), strict=True)
-    v, y = (np.stack(pair, axis=len(shape)) for *pair, shape in pairs)
-    return v, y
 
 
 def _values(system: System, name: str, states: State) -> Array:
@@ -304,13 +236,7 @@ def _of_a_change(run: Run, name: str, start: State, values: tuple[Array, Array])
     wrong &= by_exchange | by_size
     if not wrong.any():
         return None
-    index, some = tuple(np.argwhere(wrong)[0].tolist()), int(np.count_nonzero(wrong))
-    text = (
-        f"{share(some, wrong.shape, wrong.size)} {'has' if some == 1 else 'have'} another {name} at the end: "
-        f"{f'{in_words(index)} has ' if wrong.size > 1 else ''}{last[index]:.3g} instead of {first[index]:.3g}, "
-        f"so {run.method.name} did not follow the motion"
-    )
-    return text, wrong
+    return another(wrong, name, first, last, f"{run.method.name} did not follow the motion"), wrong
 
 
 def _end(run: Run) -> State:
@@ -354,14 +280,12 @@ def _places(system: System) -> list[tuple[int, tuple[int, ...]]]:
 
 
 def _with(state: State, which: int, index: tuple[int, ...], number: Any) -> State:
-    """A state with another number in one place."""
     v, y = (np.array(each) if k == which else each for k, each in enumerate(state))
     (v, y)[which][index] = number
     return v, y
 
 
 def _of_several(system: System, name: str, states: list[State]) -> Array:
-    """An invariant of several states of all members."""
     shapes = system.v_shape, system.y_shape
     v, y = (np.stack([each[i] for each in states], axis=len(shapes[i])) for i in range(2))
     return _values(system, name, (v, y))
@@ -423,56 +347,54 @@ def _of_a_step(run: Run, slopes: State) -> Array:
     return np.asarray(sum((np.abs(slope) * error).sum(axis=tuple(range(len(shape)))) for slope, error, shape in parts))
 
 
-class Barrier(NamedTuple):
-    """The place within each member's motion at which it takes the most energy to be, and how much; −∞ where there is none."""
+def _of_a_barrier(run: Run, name: str, first: Array, barrier: State) -> About | None:
+    """Members that passed a place along a line where even at rest they would have more energy than they have.
 
-    place: Array
-    height: Array
-
-
-def _of_a_barrier(run: Run, name: str, first: Array, barrier: Barrier) -> About | None:
-    """Members that passed a place along a line where even at rest they would have more energy than they have."""
-    passed = (barrier.height > first + ROUNDING * np.abs(first)) & (barrier.height < np.inf) & (run.status == 0)
+    A barrier is the place within each member's motion at which it takes the most energy to be, and how much; −∞ if there is none.
+    """
+    _, most = barrier
+    passed = (most > first + ROUNDING * np.abs(first)) & (most < np.inf) & (run.status == 0)
     if not passed.any():
         return None
-    index, some = tuple(np.argwhere(passed)[0].tolist()), int(np.count_nonzero(passed))
-    who = f"{in_words(index)} passed" if passed.size > 1 else "it passed"
-    place, height, had = (float(np.broadcast_to(each, passed.shape)[index]) for each in (*barrier, first))
+    who = named(passed)
+    passes = f"{in_words(who.place)} passed" if passed.size > 1 else "it passed"
+    place, height, had = (float(np.broadcast_to(each, passed.shape)[who.place]) for each in (*barrier, first))
     text = (
-        f"{share(some, passed.shape, passed.size)} did not follow the motion, by {run.method.name}: {who} y = {place:.4g}, where "
+        f"{who.share} did not follow the motion, by {run.method.name}: {passes} y = {place:.4g}, where "
         f"even at rest the {name} is {height:.10g}, with {had:.10g} at the start; take "
         f"{'shorter steps' if run.paces is None else 'a smaller tolerance'}"
     )
     return text, passed
 
 
-def _saved(run: Run, start: State) -> State:
-    """Between which y the saved states of each member are."""
-    ys = np.concatenate([start[1][np.newaxis], run.y])
-    return np.asarray(np.fmin.reduce(ys, axis=0)), np.asarray(np.fmax.reduce(ys, axis=0))
-
-
-def _farthest(run: Run) -> State:
-    """Between which y each member may have been, from its largest distance from 0 at the ends of its adaptive steps."""
+def _region(run: Run, start: State) -> State:
+    """Between which y each member may have been: by its saved states, or by its largest distance from 0 in adaptive steps."""
+    if run.paces is None:
+        ys = np.concatenate([start[1][np.newaxis], run.y])
+        return np.asarray(np.fmin.reduce(ys, axis=0)), np.asarray(np.fmax.reduce(ys, axis=0))
     _, farthest = _sizes(run, _longest(run))
     farthest = np.fmax(farthest, np.abs(run.y[-1]))  # within the last step
     return -farthest, farthest
 
 
-def _stepped(run: Run, name: str, start: State, above: Array, visited: Visited | None) -> State | None:
+def _stepped(case: Case, name: str, start: State, above: Array) -> State | None:
     """Between which y each member has been at the ends of its adaptive steps, which do not depend on the saved times.
 
     The steps are made again only for members with a barrier that the tolerated errors of all their steps together would lift
     them over. None if no member has such a barrier.
     """
+    run, request, control = case.run, case.request, case.request.step_control
     assert run.paces is not None
     fastest, _ = _sizes(run, _longest(run))
     states = (start, _end(run), (np.broadcast_to(fastest, run.status.shape), start[1]))
     of_a_step = np.maximum.reduce([_of_a_step(run, _slopes(run.system, name, state)) for state in states])
     may = (above < np.inf) & ~(above > run.paces.accepted * of_a_step) & (run.status == 0)
-    if visited is None or not may.any():
+    if control is None or not may.any():
         return None
-    least, most, rejected = visited(np.flatnonzero(may))
+    from ..events.attempts import extremes  # only runs beside a barrier need it
+
+    some = np.flatnonzero(may)
+    least, most, rejected = extremes(request.plan, control.pacing, control.paces, request.v, request.y, some)
     # Where a saved state caused a rejection, the steps were others, of which only the saved states are known.
     known = np.where(rejected == run.paces.rejected[may], run.y[-1:][:, may], run.y[:, may])
     between = [np.array(np.broadcast_to(start[1], run.status.shape)) for _ in range(2)]
@@ -481,15 +403,14 @@ def _stepped(run: Run, name: str, start: State, above: Array, visited: Visited |
     return between[0], between[1]
 
 
-def _upright(run: Run, between: State) -> Barrier:
-    """The barrier of a pendulum: upright."""
+def _upright(run: Run, between: State) -> State:
     assert isinstance(run.system, Pendulum)
     least, most = between
     place = pi * (2.0 * np.ceil(0.5 * (least / pi - 1.0)) + 1.0)
-    return Barrier(place, np.where((least < place) & (place < most), 2.0 * run.system.omega * run.system.omega, -np.inf))
+    return place, np.where((least < place) & (place < most), 2.0 * run.system.omega * run.system.omega, -np.inf)
 
 
-def _searched(run: Run, name: str, start: State, first: Array, between: State, places: int) -> Barrier:
+def _searched(run: Run, name: str, start: State, first: Array, between: State, places: int) -> State:
     """The barrier of an invariant: the highest of many places, and of more and more around it.
 
     It is higher than what is beside it, since a motion may err beyond where it turns; and rest takes the least energy there.
@@ -506,14 +427,14 @@ def _searched(run: Run, name: str, start: State, first: Array, between: State, p
         top, *lower = (np.take_along_axis(height, best + side, axis=0)[0] for side in (0, -1, 1))
         # Between them it is higher by no more than it falls beside, but for a peak that is narrower than they are apart.
         if not (has_peak & (2.0 * top - np.minimum(*lower) > first)).any():
-            return Barrier(place, np.full(place.shape, -np.inf))
+            return place, np.full(place.shape, -np.inf)
         y = _between(low, high, FINER)
         height = _values(system, name, (0.0 * y, y))
         best = np.clip(height.argmax(axis=0), 1, FINER - 2)[np.newaxis]
     fastest = np.maximum(np.abs(start[0]), np.fmax.reduce(np.abs(run.v), axis=0))
     speeds = _between(-fastest, fastest, 5)
     least_at_rest = (_values(system, name, (speeds, place + 0.0 * speeds)) >= top).all(axis=0)
-    return Barrier(place, np.where(has_peak & least_at_rest, top, -np.inf))
+    return place, np.where(has_peak & least_at_rest, top, -np.inf)
 
 
 def _between(low: Array, high: Array, places: int) -> Array:

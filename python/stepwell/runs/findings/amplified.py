@@ -13,17 +13,15 @@ from typing import NamedTuple, Self
 
 import numpy as np
 
-from ..base.arrays import Array, Whole
-from ..base.reprs import first_of, share
-from ..errors import AccuracyWarning
-from ..model.methods import Method
-from ..runs import engine
-from ..runs.findings import Finding, at_places
-from ..runs.request import Request
-from ..runs.result import Run, Status
-from .stability.function import function
-from .stability.parts import function_of_rates
-from .stiffness import MOST_NUMBERS, MOST_RATES, Complex, Stand, course_of, derivatives_of, rates_of, stands_of
+from ...base import registry
+from ...base.arrays import Array, Whole
+from ...errors import AccuracyWarning, UnsupportedError
+from ...model.methods import Method
+from .. import engine
+from ..noticed import Finding, Found
+from ..result import Status
+from . import Case
+from .stiffness import MOST_NUMBERS, MOST_RATES, Complex, Stand, course_of, derivatives_of, may_be_stiff, rates_of, stands_of
 
 #: A part is told that was multiplied by AMPLIFIED in all and is more than MATTERS times what is tolerated of a step.
 AMPLIFIED, MATTERS = 1.5, 16.0
@@ -35,23 +33,27 @@ def growth_of(method: Method, order: int, z: Complex) -> Array:
     """The logarithm of |R(z)|; of a series of that order."""
     terms = [1.0 / math.factorial(k) for k in range(order, -1, -1)]
     with np.errstate(all="ignore"):
-        grown: Array = np.log(np.abs(np.polyval(terms, z) if method.has_series else function(method)(z)))
+        factor = np.polyval(terms, z) if method.has_series else registry.task("stability_function")(method)(z)
+        grown: Array = np.log(np.abs(factor))
     return grown
 
 
-def finding_of(run: Run, request: Request, waypoints: Array, least_steps: int) -> Finding | None:
-    """The finding of members of at least so many steps whose fast oscillations the method amplified; None if there is none."""
+def of_run(case: Case) -> Finding | None:
+    """The members of a run whose fast oscillations the method amplified."""
+    run, course = case.run, course_of(case.run, case.request)
+    plan, numbers = course.plan, run.v[-1].size + run.y[-1].size
     assert run.paces is not None
-    course, shape = course_of(run, request), run.status.shape
-    plan = course.plan
-    if plan.method.is_implicit or not function_of_rates(plan.method):
+    if plan.method.is_implicit:
         return None
-    if growth_of(plan.method, plan.order, np.array(0.5j)) <= LEAST:
-        return None  # it damps them
-    n = (run.v[-1].size + run.y[-1].size) // max(run.status.size, 1)
-    members = np.flatnonzero(((run.paces.accepted >= least_steps) & (run.status == Status.OK)).reshape(-1))
+    try:
+        if growth_of(plan.method, plan.order, np.array(0.5j)) <= LEAST:
+            return None  # it damps them
+    except UnsupportedError:  # it treats v and y differently
+        return None
+    n = numbers // max(run.status.size, 1)
+    members = np.flatnonzero((may_be_stiff(run.paces.accepted, numbers) & (run.status == Status.OK)).reshape(-1))
     members = members[: MOST_NUMBERS // (n * n)] if n <= MOST_RATES else members[:0]
-    stands = stands_of(course, waypoints, members) if members.size else []
+    stands = stands_of(course, case.waypoints[0], members) if members.size else []
     if len(stands) < 3:
         return None
     counts = run.paces.accepted.reshape(-1)[members]
@@ -64,29 +66,21 @@ def finding_of(run: Run, request: Request, waypoints: Array, least_steps: int) -
     found = np.flatnonzero((amplified >= AMPLIFIED) & (part > 0.0))
     if not found.size:
         return None
-    k, some = int(found[0]), found.size
-    first = tuple(map(int, np.unravel_index(int(members[k]), shape))) if shape else ()
-    of_first, t = first_of(some, first, run.status.size), run.paces.t.reshape(-1)[members[k]]
-    text = (
-        f"steps of {plan.method.name} amplify the fastest oscillations of {share(some, shape, run.status.size)}{of_first}, of "
-        f"rates up to {end.rate[k]:.3g} at t = {t:g}, by {amplified[k]:.2g} times in all; at the end they are {part[k]:.1g} of "
-        f'the state, most of it errors: take "dop853", which damps them, or a smaller tolerance'
+    k = int(found[0])
+    t, before = run.paces.t.reshape(-1)[members[k]], f"steps of {plan.method.name} amplify the fastest oscillations of "
+    why = (
+        f"of rates up to {end.rate[k]:.3g} at t = {t:g}, by {amplified[k]:.2g} times in all; at the end they are {part[k]:.1g} "
+        f'of the state, most of it errors: take "dop853", which damps them, or a smaller tolerance'
     )
-    return at_places(AccuracyWarning, text, members[found], shape)
+    return Found(AccuracyWarning, members[found], run.status.shape, before, "", ",", why).finding()
 
 
 class Modes(NamedTuple):
-    """The modes of members where they stand.
+    """The modes of members where they stand."""
 
-    Attributes:
-        values: their eigenvalues, shape (members, modes).
-        vectors: their vectors.
-        grown: by which power of e the steps of the run multiply each; 0 of those that decay or grow by themselves.
-    """
-
-    values: Complex
+    values: Complex  # their eigenvalues, shape (members, modes)
     vectors: Complex
-    grown: Array
+    grown: Array  # by which power of e the steps of the run multiply each; 0 of those that decay or grow by themselves
 
     @classmethod
     def at(cls, plan: engine.Plan, members: Whole, stand: Stand, elapsed: Array, counts: Whole) -> Self:

@@ -18,24 +18,27 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..base.arrays import Array, Shape, Whole
-from ..base.immutable import by_value
-from ..base.reprs import first_of, share
-from ..errors import StiffnessWarning, UnsupportedError
-from ..model.compatibility import fits_together
-from ..model.methods import Method, for_stiff
-from ..model.methods import method as find_method
-from ..model.systems import LinearSystem
-from ..reference import adaptive
-from ..runs import engine
-from ..runs.events.attempts import attempted
-from ..runs.events.members import Members
-from ..runs.findings import Finding, at_places
-from ..runs.request import Request
-from ..runs.result import Run, Status
+from ...base import registry
+from ...base.arrays import Array, Shape, Whole
+from ...errors import StiffnessWarning, UnsupportedError
+from ...model.compatibility import fits_together
+from ...model.methods import Method, for_stiff
+from ...model.methods import method as find_method
+from ...model.systems import LinearSystem
+from ...reference import adaptive
+from .. import engine
+from ..events.attempts import attempted
+from ..events.members import Members
+from ..noticed import Finding, Found
+from ..request import Request
+from ..result import Run, Status
+from . import MANY, Case
 
 Complex = np.ndarray[Any, np.dtype[np.complex128]]
 
+#: Stiffness is looked for in runs of ``MANY`` steps: little work beside a run whose members have FEW_NUMBERS in all. A run of
+#: less numbers makes a thousand steps in some tenths of a millisecond, so there it is MANY_OF_FEW.
+MANY_OF_FEW, FEW_NUMBERS = 2048, 64
 #: Steps are looked at further if they change no group of components by more than MOVED times the tolerated error, or by more than
 #: this part of a step for which accuracy asks: its error is about the power ``error_order`` of its relative change.
 MOVED, PART_OF_A_STEP = 4.0, 0.25
@@ -65,83 +68,39 @@ LEAST = np.finfo(np.float64).tiny / PART
 
 
 class Stand(NamedTuple):
-    """Where some members stand, one after the other; a member may be there several times.
+    """Where some members stand, one after the other; a member may be there several times."""
 
-    Attributes:
-        members: their places in the flattened batch.
-        paces: their step-size controllers, shape (numbers, stands).
-        v: velocities, shape (*block, stands).
-        y: coordinates, likewise.
-    """
-
-    members: Whole
-    paces: Array
-    v: Array
+    members: Whole  # their places in the flattened batch
+    paces: Array  # their step-size controllers, shape (numbers, stands)
+    v: Array  # shape (*block, stands)
     y: Array
 
 
 class Held(NamedTuple):
-    """The stability bound on the steps from where members stand; a rate and a limit are zero where no matrix gives them.
+    """The stability bound on the steps from where members stand; a rate and a limit are zero where no matrix gives them."""
 
-    Attributes:
-        ratio: how many times as long steps the tolerance allows; 0 if it is not stability that holds them down.
-        t: the time there, in the direction of the system.
-        rate: the eigenvalue of the largest size of the derivative of the rates.
-    """
-
-    ratio: Array
-    t: Array
-    rate: Complex
+    ratio: Array  # how many times as long steps the tolerance allows; 0 if it is not stability that holds them down
+    t: Array  # the time there, in the direction of the system
+    rate: Complex  # the eigenvalue of the largest size of the derivative of the rates
 
 
 class Course(NamedTuple):
-    """A run with adaptive steps after its end.
-
-    Attributes:
-        plan: of the run.
-        tolerance: the relative tolerance, the least of all.
-        jumps: the times that no step crosses, as ``Pacing`` has them, or None.
-        status: how members ended, shape (*batch).
-        paces: their step-size controllers at the end, shape (numbers, *batch).
-        v: their velocities at the end.
-        y: their coordinates there.
-        way: 1, or −1 where the user's time runs back.
-    """
+    """A run with adaptive steps after its end."""
 
     plan: engine.Plan
-    tolerance: float
-    jumps: Array | None
-    status: Any
-    paces: Array
-    v: Array
+    tolerance: float  # the relative one, the least of all
+    jumps: Array | None  # the times that no step crosses, as ``Pacing`` has them
+    status: Any  # how members ended, shape (*batch)
+    paces: Array  # their step-size controllers at the end, shape (numbers, *batch)
+    v: Array  # their state at the end
     y: Array
-    way: float
+    way: float  # 1, or −1 where the user's time runs back
 
     def walls(self, members: Whole) -> Array | None:
         """``jumps`` of some members."""
         if self.jumps is None or self.jumps.ndim == 1:
             return self.jumps
         return np.broadcast_to(self.jumps, (len(self.jumps), *self.plan.batch)).reshape(len(self.jumps), -1)[:, members]
-
-
-@by_value
-class Stiff(NamedTuple):
-    """Members whose steps were held down by stability, and that did not stop.
-
-    Attributes:
-        members: their places in the flattened batch.
-        first: the place of the first of them in the batch.
-        why: the limit there, how much longer steps the tolerance allows, and what to do.
-    """
-
-    members: Whole
-    first: Shape
-    why: str
-
-    @property
-    def number(self) -> int:
-        """How many members are stiff."""
-        return len(self.members)
 
 
 #: Message about stiff members, before the reason.
@@ -158,17 +117,21 @@ def course_of(run: Run, request: Request) -> Course:
     return Course(request.plan, least, control.pacing.jumps, run.status, end.pace, end.v, end.y, way)
 
 
-def finding_of(run: Run, request: Request, waypoints: Array) -> Finding | None:
-    """The finding for the members whose steps were held down by stability, and that did not stop; None if there is none."""
-    stiff = stiff_members(course_of(run, request), waypoints)
-    if stiff is None:
+def may_be_stiff(steps: Any, numbers: int) -> Any:
+    """True if a run of so many accepted steps, whose members have so many numbers in all, is tested for stiffness."""
+    return steps >= (MANY if numbers >= FEW_NUMBERS else MANY_OF_FEW)
+
+
+def of_run(case: Case) -> Finding | None:
+    """The members of a run whose steps were held down by stability, and that did not stop."""
+    run = case.run
+    if not may_be_stiff(case.steps, run.y[-1].size + run.v[-1].size):
         return None
-    shape, size = run.status.shape, run.status.size
-    text = f"{HELD_DOWN} {share(stiff.number, shape, size)}{first_of(stiff.number, stiff.first, size)}"
-    return at_places(StiffnessWarning, f"{text}{';' if size > 1 else ':'} {stiff.why}", stiff.members, shape)
+    found = stiff_members(course_of(run, case.request), case.waypoints[0])
+    return None if found is None else found._replace(joint=";" if run.status.size > 1 else ":").finding()
 
 
-def stiff_members(course: Course, waypoints: Array) -> Stiff | None:
+def stiff_members(course: Course, waypoints: Array) -> Found | None:
     """The members whose steps were held down by stability, and that did not stop; None if there is none."""
     if course.plan.method.is_always_stable or not (seen := suspects(course.plan, waypoints)):
         return None
@@ -185,8 +148,7 @@ def stiff_members(course: Course, waypoints: Array) -> Stiff | None:
     verdict = verdicts[int(stiff[:, k].argmax())]
     limit = _in_words(course.plan, verdict, k, f"at t = {verdict.t[k]:g}")
     why = f"{limit}, where the tolerance allows {_times(verdict.ratio[k])} as long (stiff equations); {_advice(course)}"
-    first = np.unravel_index(int(members[k]), course.status.shape) if course.status.shape else ()
-    return Stiff(members[held], tuple(map(int, first)), why)
+    return Found(StiffnessWarning, members[held], course.status.shape, f"{HELD_DOWN} ", "", ":", why)
 
 
 def held_by_stability(run: Run, request: Request, waypoints: Sequence[Array], index: Shape) -> str:
@@ -208,14 +170,12 @@ def held_by_stability(run: Run, request: Request, waypoints: Sequence[Array], in
 
 
 def _in_words(plan: engine.Plan, verdict: Held, k: int, where: str) -> str:
-    """The fastest rate and the longest stable step, in words."""
     rate = complex(verdict.rate[k])
     limit = limit_of(plan.method, plan.order, rate)
     return f"the fastest rate {where}, 1/{1.0 / abs(rate):.3g}, lets no steps beyond {limit:.3g} be stable"
 
 
 def _times(ratio: float) -> str:
-    """A ratio in words, with one digit."""
     return "more than 1000 times" if ratio >= MOST_RATIO else f"about {float(f'{ratio:.1g}'):g} times"
 
 
@@ -325,15 +285,20 @@ def _verdicts(course: Course, stands: Sequence[Stand]) -> list[Held]:
     return [Held(*each) for each in zip(*(np.split(numbers, len(stands)) for numbers in held), strict=True)]
 
 
+def begun(paces: Array) -> Array:
+    """A copy of step-size controllers, for further attempts from where they stand."""
+    paces = np.array(paces)
+    paces[[engine.EXTRA, engine.HELD, *range(engine.COUNTS.start, engine.COUNTS.stop)]] = 0.0
+    return paces
+
+
 def _held(course: Course, stand: Stand) -> Held:
     plan, jumps = Members(course.plan._replace(progress=None)).plan(stand.members), course.walls(stand.members)
-    paces = np.array(stand.paces)
-    paces[[engine.EXTRA, engine.HELD, *range(engine.COUNTS.start, engine.COUNTS.stop)]] = 0.0
+    paces = begun(stand.paces)
     t, most = paces[engine.TIME], paces[engine.MOST_STEP].copy()
     natural = attempted(plan, np.inf, NATURAL, NATURAL, False, paces, stand.v, stand.y, jumps)
     step = (natural.t[-1] - t) / NATURAL
-    paces = natural.paces.copy()
-    paces[[engine.HELD, *range(engine.COUNTS.start, engine.COUNTS.stop)]] = 0.0
+    paces = begun(natural.paces)
     paces[engine.MOST_STEP] = np.minimum(most, SETTLED * step)
     paces[engine.STEP] = np.minimum(paces[engine.STEP], paces[engine.MOST_STEP])
     settled = attempted(plan, np.inf, SETTLING, SETTLING, False, paces, natural.v[-1], natural.y[-1], jumps)
@@ -386,13 +351,11 @@ def limit_of(method: Method, order: int, rate: complex) -> float:
 @cache
 def _limit_along(name: str, order: int, angle: float) -> float:
     """The longest stable step for a rate of size 1 at an angle."""
-    from .stability import stability_limit  # needed for stiff equations only
-
     method, mode = find_method(name), complex(math.cos(angle), math.sin(angle) if angle < math.pi else 0.0)
     if method.has_series and order:
         return _limit_of_series(order, mode)
     matrix = [[mode.real, -mode.imag], [mode.imag, mode.real]] if mode.imag else [[mode.real]]
-    return float(stability_limit(LinearSystem(matrix), method))
+    return float(registry.task("stability_limit")(LinearSystem(matrix), method))
 
 
 def _limit_of_series(order: int, mode: complex) -> float:

@@ -9,22 +9,21 @@ from __future__ import annotations
 
 import math
 from math import prod
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
-from ..base.arrays import Array, Shape, Whole
-from ..base.immutable import by_value
-from ..base.reprs import first_of, share
-from ..errors import AccuracyWarning
-from ..model.methods import Method
-from ..model.systems import System
-from ..reference import adaptive
-from . import engine
-from .events.members import Members
-from .findings import Finding, at_places, may_have_amounts
-from .options.positive import name_of
-from .result import Run
+from ...base.arrays import Array, Whole
+from ...errors import AccuracyWarning
+from ...model.methods import Method
+from ...model.systems import System
+from ...reference import adaptive
+from .. import engine
+from ..events.members import Members
+from ..noticed import Finding, Found
+from ..options.positive import name_of
+from ..result import Run
+from . import Case, may_have_amounts
 
 #: Errors of many steps add up to so many times the tolerated one of a step, but to no more than this part of a size.
 BEYOND, PART = 100.0, 0.01
@@ -38,35 +37,13 @@ GOLDEN = (math.sqrt(5.0) - 1.0) / 2.0
 AT_ONCE = 256
 
 
-@by_value
-class Negative(NamedTuple):
-    """Members that ended at a negative amount, beyond what is tolerated, which their equations do not reach.
-
-    Attributes:
-        members: their places in the flattened batch.
-        first: the place of the first of them in the batch.
-        size: where its most negative amount ended, in words.
-        why: why no solution ends there, and what to do.
-    """
-
-    members: Whole
-    first: Shape
-    size: str
-    why: str
-
-    @property
-    def number(self) -> int:
-        """How many members ended so."""
-        return len(self.members)
-
-    def finding(self, shape: Shape) -> Finding:
-        """The finding for a batch of this shape."""
-        size = prod(shape)
-        text = f"{self.size} in {share(self.number, shape, size)}{first_of(self.number, self.first, size)}, {self.why}"
-        return at_places(AccuracyWarning, text, self.members, shape)
+def of_run(case: Case) -> Finding | None:
+    """The members of a run that ended at a negative amount."""
+    found = of_a_run(case.run, case.request.y, case.request.plan)
+    return None if found is None else found.finding()
 
 
-def of_a_run(run: Run, start: Array, plan: engine.Plan | None = None) -> Negative | None:
+def of_a_run(run: Run, start: Array, plan: engine.Plan | None = None) -> Found | None:
     """The members of a run that began at amounts ``start`` and ended at a negative one; ``plan`` is that of adaptive steps."""
     end = run.controller_state
     if end is None or plan is None:
@@ -78,7 +55,7 @@ def of_a_run(run: Run, start: Array, plan: engine.Plan | None = None) -> Negativ
     return negative(run.system, run.method, (start, end.y), run.t[-1], allowed)
 
 
-def negative(system: System, method: Method, ends: tuple[Array, Array], t: Any, allowed: Array | None = None) -> Negative | None:
+def negative(system: System, method: Method, ends: tuple[Array, Array], t: Any, allowed: Array | None = None) -> Found | None:
     """The members that ended at a negative amount, beyond what is tolerated, which their equations do not reach, or None.
 
     Args:
@@ -108,13 +85,12 @@ def negative(system: System, method: Method, ends: tuple[Array, Array], t: Any, 
         return None
     one = int(members[0])
     place = int(np.argmin(np.where(beyond[:, one], last[:, one], 0.0)))
-    instead = "a shorter step" if is_fixed else "a smaller tolerance, or give positive=True"
     why = (
         f"which no solution reaches: no rate of these equations is negative where its number is 0. An error of the steps gave it "
-        f"the wrong sign; take {instead}"
+        f"the wrong sign; take {'a shorter step' if is_fixed else 'a smaller tolerance, or give positive=True'}"
     )
-    index = tuple(int(i) for i in np.unravel_index(one, batch)) if batch else ()
-    return Negative(members, index, f"{name_of(system, place)} ends at {last[place, one]:.3g}", why)
+    before = f"{name_of(system, place)} ends at {last[place, one]:.3g} in "
+    return Found(AccuracyWarning, members, batch, before, "", ",", why)
 
 
 def _allowed(plan: engine.Plan, pace: Array) -> Array:

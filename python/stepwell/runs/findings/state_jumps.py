@@ -13,25 +13,26 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..base.arrays import Array, Shape
-from ..base.reprs import first_of, share
-from ..errors import ToleranceWarning
-from ..runs import engine
-from ..runs.events.attempts import attempted
-from ..runs.events.members import Members
-from ..runs.findings import Finding, at_places
-from ..runs.request import Request
-from ..runs.result import Run, Status
-from .stiffness import Course, Stand, course_of, rates_of, stands_of
+from ...base.arrays import Array, Shape
+from ...errors import ToleranceWarning
+from .. import engine
+from ..events.attempts import attempted
+from ..events.members import Members
+from ..noticed import Finding, Found
+from ..options.positive import name_of
+from ..request import Request
+from ..result import Run, Status
+from . import Case
+from .stiffness import MANY_OF_FEW, Course, Stand, begun, course_of, rates_of, stands_of
 
 #: The rates are compared at so many places of a line, which reaches so many steps forth and back, and so often where they differ
 #: most: 2⁸ parts of 2⁸ parts, down to roundings.
 PLACES, REACH, TIMES = 257, 8.0, 6
 #: A difference is a jump if this part of it is left there, and matters if, in a step, it makes this part of what is tolerated.
 LEFT, MATTERS = 0.25, 0.01
-#: A run that came to its end is looked at after so many accepted steps. It crept if so many attempts from both of its waypoints
-#: end at a jump again, with steps that are alike within that factor: those that only cross a jump grow by far more.
-MANY, ATTEMPTS, ALIKE = 2048, 64, 100.0
+#: A run that came to its end is looked at after ``MANY_OF_FEW`` accepted steps. It crept if so many attempts from both of its
+#: waypoints end at a jump again, with steps that are alike within that factor: those that only cross a jump grow by far more.
+ATTEMPTS, ALIKE = 64, 100.0
 
 
 class Jump(NamedTuple):
@@ -53,37 +54,29 @@ def why_short(run: Run, request: Request, waypoints: Sequence[Array], index: Sha
     return "" if jump is None else f": {_in_words(run, jump)}"
 
 
-def finding_of(run: Run, request: Request, waypoints: Array) -> Finding | None:
-    """The finding of a member that came to its end, but crept at a jump for most of its steps; None if there is none."""
+def of_run(case: Case) -> Finding | None:
+    """The first member that came to its end, but crept at a jump for most of its steps."""
+    run = case.run
     assert run.paces is not None
     accepted, status = run.paces.accepted.reshape(-1), run.status.reshape(-1)
-    counts = np.where((status == Status.OK) & (accepted >= MANY), accepted, 0)
+    counts = np.where((status == Status.OK) & (accepted >= MANY_OF_FEW), accepted, 0)
     if not counts.any() or not run.system.chooses:
         return None
-    course, first = course_of(run, request), int(counts.argmax())
-    jumps = [_crept(course, stand) for stand in stands_of(course, waypoints, np.array([first]))[1:]]
+    course, first = course_of(run, case.request), np.array([counts.argmax()])
+    jumps = [_crept(course, stand) for stand in stands_of(course, case.waypoints[0], first)[1:]]
     if len(jumps) < 2 or (jump := jumps[-1]) is None or jumps[0] is None:
         return None
-    shape, size = run.status.shape, run.status.size
-    of_first = tuple(map(int, np.unravel_index(first, shape))) if shape else ()
-    attempts = int(counts[first] + run.paces.rejected.reshape(-1)[first])
-    text = (
-        f"{attempts} attempts of {share(1, shape, size)}{first_of(1, of_first, size)}, many of them short at a jump of the rates"
-    )
-    return at_places(ToleranceWarning, f"{text}; {_in_words(run, jump)}", np.array([first]), shape)
+    before = f"{int(counts[first[0]] + run.paces.rejected.reshape(-1)[first[0]])} attempts of "
+    why = f"many of them short at a jump of the rates; {_in_words(run, jump)}"
+    return Found(ToleranceWarning, first, run.status.shape, before, "", ",", why).finding()
 
 
 def _in_words(run: Run, jump: Jump) -> str:
-    n_v = prod(run.system.v_shape)
-    block, shape, place = (
-        ("v", run.system.v_shape, jump.place) if jump.place < n_v else ("y", run.system.y_shape, jump.place - n_v)
-    )
-    name = block + (f"[{', '.join(str(int(each)) for each in np.unravel_index(place, shape))}]" if shape else "")
     one, other = jump.values
     return (
-        f"the rate of {name} jumps from {one:.3g} to {other:.3g} at t = {jump.t:g}, where the state crosses a condition "
-        f"(np.where, sign, floor, …), which steps do not see: make it an event, whose then= changes the state or a number that "
-        f"the rates read"
+        f"the rate of {name_of(run.system, jump.place)} jumps from {one:.3g} to {other:.3g} at t = {jump.t:g}, where the state "
+        f"crosses a condition (np.where, sign, floor, …), which steps do not see: make it an event, whose then= changes the "
+        f"state or a number that the rates read"
     )
 
 
@@ -92,9 +85,7 @@ def _crept(course: Course, stand: Stand) -> Jump | None:
     if (jump := _jump(course, stand)) is None:
         return None
     plan, walls = Members(course.plan._replace(progress=None)).plan(stand.members), course.walls(stand.members)
-    paces = np.array(stand.paces)
-    paces[[engine.EXTRA, engine.HELD, *range(engine.COUNTS.start, engine.COUNTS.stop)]] = 0.0
-    later = attempted(plan, np.inf, ATTEMPTS, ATTEMPTS, False, paces, stand.v, stand.y, walls)
+    later = attempted(plan, np.inf, ATTEMPTS, ATTEMPTS, False, begun(stand.paces), stand.v, stand.y, walls)
     steps = np.diff(later.t[:, 0])
     steps = steps[steps > 0.0]
     alike = steps.size > 0 and float(steps.max()) <= ALIKE * float(steps.min())
