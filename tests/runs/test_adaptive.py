@@ -12,7 +12,7 @@ from stepwell.errors import ArgumentError, ShapeError, TooLargeError, Unsupporte
 from stepwell.reference import series_pace
 from stepwell.reference.acceptance import Acceptance
 from stepwell.reference.traced import Tracer
-from stepwell.runs import engine, kept_steps
+from stepwell.runs import accepted_steps, engine
 from stepwell.runs.result import Status
 from stepwell.scenes.stiff_equations import rober
 from support.cases import SYSTEMS
@@ -434,7 +434,7 @@ def test_room_does_not_change_a_bit(monkeypatch: pytest.MonkeyPatch) -> None:
     growth = sw.LinearSystem([[0.7]], velocities=0)
     whole = ensemble(threads=1), sw.integrate(growth, "merson", **ask)
     for run, numbers in ((lambda: ensemble(threads=2), 3 * 300 * 2), (lambda: sw.integrate(growth, "merson", **ask), 12)):
-        monkeypatch.setattr(kept_steps, "NUMBERS_AT_ONCE", numbers)  # two steps of each member at a time
+        monkeypatch.setattr(accepted_steps, "NUMBERS_AT_ONCE", numbers)  # two steps of each member at a time
         assert_same_run(run(), whole[numbers == 12])
 
 

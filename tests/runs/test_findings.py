@@ -10,8 +10,8 @@ import pytest
 import stepwell as sw
 from stepwell.analysis.stability import limit
 from stepwell.errors import ArgumentError, UnsupportedError
+from stepwell.runs.execution import noticing, quietly
 from stepwell.runs.findings import growth, negative
-from stepwell.runs.making import noticing, quietly
 from stepwell.runs.options import Options
 from stepwell.runs.request import Request
 from stepwell.scenes.stiff_equations import rober

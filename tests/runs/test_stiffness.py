@@ -17,8 +17,8 @@ from stepwell.model import methods as all_methods
 from stepwell.model.methods import for_stiff
 from stepwell.runs import engine
 from stepwell.runs.adaptive import adaptive_run
+from stepwell.runs.execution import quietly
 from stepwell.runs.findings import stiffness
-from stepwell.runs.making import quietly
 from stepwell.runs.options import Options
 from stepwell.runs.request import Request
 from stepwell.studies.sweeps import task

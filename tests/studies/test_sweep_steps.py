@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import stepwell as sw
 from stepwell.errors import ArgumentError
-from stepwell.studies.sweeps import lengths, outcomes, task
+from stepwell.studies.sweeps import mixed_steps, outcomes, task
 from support.cases import SYSTEMS, fits
 from support.looped import in_turn, looped
 
@@ -90,14 +90,14 @@ def driven(t: Any, v: Any, y: Any, *, omega: Any = 1.0, push: Any = 0.3) -> Any:
 def pieces(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     """How many members were in each piece of those that are stepped together."""
     sizes: list[int] = []
-    make = lengths.Lengths.make
+    make = mixed_steps.Lengths.make
 
-    def counted(self: lengths.Lengths, **options: Any) -> sw.Run:
+    def counted(self: mixed_steps.Lengths, **options: Any) -> sw.Run:
         run = make(self, **options)
         sizes.append(run.status.size)
         return run
 
-    monkeypatch.setattr(lengths.Lengths, "make", counted)
+    monkeypatch.setattr(mixed_steps.Lengths, "make", counted)
     return sizes
 
 
@@ -149,10 +149,10 @@ def test_every_system_in_steps_of_each_member(i: int, name: str) -> None:
     method = next(m for m in (*methods[i % 3 :], "standard_heun") if fits(system, sw.method(m)))
     system = system.for_state_shapes(*state)
     ask: dict[str, Any] = {"v": state[0], "y": state[1], "t0": 0.2}
-    if not lengths.together(system, sw.method(method), (sw.sweeps.Last(),), {"fused": False}):
+    if not mixed_steps.together(system, sw.method(method), (sw.sweeps.Last(),), {"fused": False}):
         return
     steps = np.array([0.01, 0.02, 0.013])
-    run = lengths.Lengths(system, sw.method(method), ask, steps, 20).make(20, 5)
+    run = mixed_steps.Lengths(system, sw.method(method), ask, steps, 20).make(20, 5)
     for k, dt in enumerate(steps):
         one = sw.integrate(system, method, **ask, dt=dt, steps=20, every=5)
         for block in ("v", "y"):

@@ -12,7 +12,7 @@ import stepwell as sw
 from stepwell import _core
 from stepwell.device import device_of
 from stepwell.errors import StepwellError
-from stepwell.runs.making import step
+from stepwell.runs.execution import step
 from stepwell.runs.options import Options
 from stepwell.runs.request import Request
 

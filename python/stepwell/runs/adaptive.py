@@ -22,7 +22,7 @@ def adaptive_run(request: Request, waypoints: list[Array] | None = None) -> Run:
     if waypoints is not None:
         pacing = pacing._replace(waypoints=True)
     if every is not None:
-        from .kept_steps import StepKeeper  # only such runs need it
+        from .accepted_steps import StepKeeper  # only such runs need it
 
         keeper = StepKeeper(every)
         adapt = keeper.adapt

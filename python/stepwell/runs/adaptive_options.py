@@ -17,8 +17,8 @@ from ..model.systems import System
 from ..reference.acceptance import Acceptance
 from . import continuation, engine
 from .options import Options
-from .options.parts import spread
 from .result import AdaptiveState
+from .start import spread
 
 if TYPE_CHECKING:
     from .continuation import Continuation

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 from ..model.methods import Method
 from ..model.systems import System
+from .execution import noticing
 from .findings import is_heard, warn_of
-from .making import noticing
 from .options import named, with_options
 from .request import Request
 from .result import Run

@@ -11,14 +11,14 @@ from ..base.arrays import Shape
 from ..errors import ArgumentError
 from ..model.methods import Method
 from ..model.systems import System
+from .execution import noticing
 from .findings import is_heard, warn_of
-from .making import noticing
 from .options import Options, named
-from .options.parts import spread
 from .request import Request
 from .result import Run
 from .short import ShortRun
 from .short_runs import fixed_options, is_free, is_small, short_run_of_request
+from .start import spread
 
 if TYPE_CHECKING:
     from typing import Unpack

@@ -34,9 +34,10 @@ from ..reference.acceptance import Acceptance
 from . import continuation, engine
 from .options import Options
 from .options.checked import Checked, refuse
-from .options.parts import (
+from .options.single import check_matrix_form
+from .options.tolerance import order_of_series, tolerances_of
+from .start import (
     check_algebraic,
-    check_matrix_form,
     checked_system,
     controlled,
     last_time,
@@ -44,7 +45,6 @@ from .options.parts import (
     spread,
     under_control,
 )
-from .options.tolerance import order_of_series, tolerances_of
 
 if TYPE_CHECKING:
     from .continuation import Continuation

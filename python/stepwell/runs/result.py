@@ -17,7 +17,7 @@ from ..errors import ArgumentError, UnsupportedError
 from ..model.methods import Method
 from ..model.systems import System
 from .encounters import Collision, Encounter
-from .noticed import Finding
+from .finding import Finding
 
 if TYPE_CHECKING:
     from pathlib import Path

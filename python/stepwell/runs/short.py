@@ -11,9 +11,9 @@ from ..base import checks
 from ..base.arrays import Array
 from ..model.systems import System
 from .findings import findings_of, is_heard
-from .options.parts import block_like
 from .request import Request
 from .result import Run
+from .start import block_like
 
 #: What the core says of a short run: it was not made; or it is certain that no member has grown.
 NOT_MADE, TAME = 0, 2

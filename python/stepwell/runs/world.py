@@ -23,8 +23,8 @@ from .findings import warn_of
 from .findings.watched import watched
 from .live import LARGEST, PLAIN, Live, Parameters, members_at
 from .options import named, with_options
-from .options.parts import controlled
 from .request import Request
+from .start import controlled
 
 if TYPE_CHECKING:
     from typing import Unpack

@@ -21,8 +21,8 @@ from ..model.controls import AnyControl, a_control
 from ..model.methods import Method
 from ..model.systems import System
 from ..model.systems.base import a_system
+from ..runs.execution import quietly
 from ..runs.integration import integrate
-from ..runs.making import quietly
 from ..runs.result import Run
 
 #: The scale of the exact solution is that of SCALE_SAMPLES times over the horizon. Where a group changes by more than STEEP of

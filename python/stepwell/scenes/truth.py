@@ -10,7 +10,7 @@ import numpy as np
 
 from ..base.arrays import Array
 from ..errors import ArgumentError, UnsupportedError
-from ..runs.making import quietly
+from ..runs.execution import quietly
 from ..runs.result import Run, Status
 from .base import Scene
 

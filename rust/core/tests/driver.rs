@@ -222,7 +222,7 @@ fn kernels_are_chosen_by_name() {
 }
 
 #[test]
-fn kept_steps() {
+fn accepted_steps() {
     let kept = |steps, every| (0..kept(steps, every)).map(|i| save(steps, every, i)).collect::<Vec<_>>();
     assert_eq!(kept(10, None), [10]);
     assert_eq!(kept(10, Some(1)).len(), 11);

@@ -325,7 +325,7 @@ fn adapt_with(
         members: arrays.status.as_array().len(),
         events,
     };
-    let (steps, kept_steps): ([&mut [f64]; 3], &mut [i64]) = match &mut arrays.steps {
+    let (steps, accepted_steps): ([&mut [f64]; 3], &mut [i64]) = match &mut arrays.steps {
         Some(KeptStepsOf { counts, t, v, y }) => {
             ([t.as_slice_mut()?, v.as_slice_mut()?, y.as_slice_mut()?], counts.as_slice_mut()?)
         }
@@ -339,7 +339,7 @@ fn adapt_with(
         status: arrays.status.as_slice_mut()?,
         attempt_log: filled(&mut arrays.trail)?,
         steps,
-        kept_steps,
+        accepted_steps,
         waypoints: filled(&mut arrays.waypoints)?,
     };
     interruptible(py, plan.progress, |monitor| adaptive::run(&run, to_fill, monitor))

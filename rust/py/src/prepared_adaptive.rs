@@ -207,7 +207,7 @@ impl PreparedAdaptive {
             status: &mut *status,
             attempt_log: &mut [],
             steps: [&mut [], &mut [], &mut []],
-            kept_steps: &mut [],
+            accepted_steps: &mut [],
             waypoints: &mut [],
         };
         let is_made = lanes.run(&run, to_fill).map_err(core_error)?;

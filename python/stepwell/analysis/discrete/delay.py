@@ -15,7 +15,7 @@ from ...model.parameters import aligned
 from ...model.systems import LinearSystem
 from ...reference import exact
 from ...reference.product import product
-from ...runs.making import quietly
+from ...runs.execution import quietly
 
 #: A dead time that is nearer to whole samples than this share of one is that of whole samples.
 WHOLE = 1e-9

@@ -31,7 +31,7 @@ from ...reference.trig import cos
 from ...runs import engine
 from ...runs.adaptive_options import check_times
 from ...runs.events.members import Members
-from ...runs.making import quietly
+from ...runs.execution import quietly
 from ..derivatives.traced import Traced, together
 from ..stability import maps
 from ..stability.analysis import velocities

@@ -9,7 +9,7 @@ import numpy as np
 from ...base.arrays import Array, Whole
 from ...errors import EventWarning
 from ...reference.events import located
-from ..noticed import Finding, named
+from ..finding import Finding, named
 from .collected import AT_START, Collected
 from .parts import Changes, Located, is_no_time
 from .traced import NewState

@@ -17,7 +17,7 @@ from ...base.arrays import Array, Shape
 from ...errors import AccuracyWarning, ControlWarning, StiffnessWarning, ToleranceWarning
 from ...model.methods import Method
 from ...model.systems import NBody, Pendulum, Springs, System
-from ..noticed import Finding, is_heard, named, warn_of
+from ..finding import Finding, is_heard, named, warn_of
 from ..request import Request
 from ..result import Run
 

@@ -10,7 +10,7 @@ from ...base import registry
 from ...base.arrays import Array
 from ...errors import AccuracyWarning
 from .. import engine
-from ..noticed import Finding, named
+from ..finding import Finding, named
 from ..result import Run
 from . import Case
 

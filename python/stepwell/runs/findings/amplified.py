@@ -18,7 +18,7 @@ from ...base.arrays import Array, Whole
 from ...errors import AccuracyWarning, UnsupportedError
 from ...model.methods import Method
 from .. import engine
-from ..noticed import Finding, Found
+from ..finding import Finding, Found
 from ..result import Status
 from . import Case
 from .stiffness import MOST_NUMBERS, MOST_RATES, Complex, Stand, course_of, derivatives_of, may_be_stiff, rates_of, stands_of

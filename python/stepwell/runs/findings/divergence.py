@@ -10,7 +10,7 @@ from ...errors import DivergenceWarning
 from ...model.methods import Method
 from ...model.systems import NBody
 from .. import encounters
-from ..noticed import Finding, Named, named
+from ..finding import Finding, Named, named
 from . import Case, time_of, when
 
 

@@ -16,7 +16,7 @@ from ...base.reprs import of_member
 from ...model.parameters import aligned
 from ...model.systems import NBody
 from ..encounters import HILL_RADII, MAX_RERUN, hill, planets
-from ..noticed import only
+from ..finding import only
 from ..result import Run
 from . import FEW_EVALUATIONS, State, when
 

@@ -13,7 +13,7 @@ from ...base.reprs import of_member
 from ...errors import AccuracyWarning
 from ...model.parameters import aligned
 from ...model.systems import NBody
-from ..noticed import Finding, named
+from ..finding import Finding, named
 from ..result import Run
 from . import FEW_EVALUATIONS, Case, State, another, evaluations_of
 from .encounters import FEW_BODIES, MOST_NUMBERS, is_long, lists, numbers_of_pairs, of_encounters

@@ -10,7 +10,7 @@ import numpy as np
 from ...base.arrays import Array
 from ...errors import AccuracyWarning
 from ...model.methods import Method
-from ..noticed import Finding, named
+from ..finding import Finding, named
 from ..result import Run
 from . import Case, State
 from .invariants import CHANGED, MOST_NUMBERS

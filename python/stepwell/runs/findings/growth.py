@@ -15,7 +15,7 @@ from ...errors import AccuracyWarning, UnsupportedError
 from ...model.compatibility import TURNING
 from ...model.methods import Method
 from ...model.systems import NBody, System
-from ..noticed import Finding, Found
+from ..finding import Finding, Found
 from ..result import Run
 from . import Case, State
 

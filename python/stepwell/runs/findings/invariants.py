@@ -14,7 +14,7 @@ from ...errors import AccuracyWarning
 from ...model.systems import Pendulum, RigidBody, System
 from ...reference.acceptance import Acceptance
 from ..engine import ABSOLUTE, PACE_NUMBERS, RELATIVE, own_tolerances
-from ..noticed import Finding, named
+from ..finding import Finding, named
 from ..result import Run
 from . import FEW_EVALUATIONS, KERNEL_OF_EQUATIONS, Case, State, another, evaluations_of, may_pass_barriers
 

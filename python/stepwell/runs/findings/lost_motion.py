@@ -9,7 +9,7 @@ import numpy as np
 from ...base.arrays import Array
 from ...errors import ToleranceWarning
 from .. import engine
-from ..noticed import Finding, named
+from ..finding import Finding, named
 from . import Case
 
 #: An absolute tolerance above this fraction of the largest length of a block so far gives a warning.

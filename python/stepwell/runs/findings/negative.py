@@ -20,7 +20,7 @@ from ...model.systems import System
 from ...reference import adaptive
 from .. import engine
 from ..events.members import Members
-from ..noticed import Finding, Found
+from ..finding import Finding, Found
 from ..options.positive import name_of
 from ..result import Run
 from . import Case, may_have_amounts

@@ -18,7 +18,7 @@ from ...errors import ToleranceWarning
 from .. import engine
 from ..events.attempts import attempted
 from ..events.members import Members
-from ..noticed import Finding, Found
+from ..finding import Finding, Found
 from ..options.positive import name_of
 from ..request import Request
 from ..result import Run, Status

@@ -29,7 +29,7 @@ from ...reference import adaptive
 from .. import engine
 from ..events.attempts import attempted
 from ..events.members import Members
-from ..noticed import Finding, Found
+from ..finding import Finding, Found
 from ..request import Request
 from ..result import Run, Status
 from . import MANY, Case

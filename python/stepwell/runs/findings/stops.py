@@ -18,7 +18,7 @@ from ...model.systems import System
 from ...reference.adaptive import OUTSIDE
 from ...reference.around import wrapped
 from .. import engine
-from ..noticed import Finding, named
+from ..finding import Finding, named
 from ..options.positive import name_of, places_of
 from ..request import Request
 from ..result import Run, Status

@@ -12,7 +12,7 @@ from ...errors import ControlWarning
 from ...model.controls import EnergyControl
 from ...model.systems import NBody, System
 from .. import encounters
-from ..noticed import Finding, only
+from ..finding import Finding, only
 from . import Case, when
 
 

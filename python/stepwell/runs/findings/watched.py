@@ -11,7 +11,7 @@ from ...base.arrays import Array
 from ...errors import AccuracyWarning
 from ...model.methods import Method
 from ...model.systems import Springs, System
-from ..noticed import Finding, named, warn_of
+from ..finding import Finding, named, warn_of
 from . import may_have_amounts
 from .growth import MOST_NUMBERS, growth
 

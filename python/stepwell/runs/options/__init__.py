@@ -66,7 +66,7 @@ def named(function: str, options: Mapping[str, Any]) -> Options:
 
 
 def with_options(way: Way | None = None) -> Callable[[F], F]:
-    """Write the options that go with a way into a signature and a documentation, in the place of ``**options``."""
+    """Write the options that go with a way into a signature and a documentation, in place of ``**options``."""
     texts = {name: text for name, option in OPTIONS.items() if (text := option.text_of(way)) is not None}
 
     def of(function: F) -> F:

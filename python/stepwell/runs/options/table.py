@@ -13,7 +13,7 @@ from ...base import checks
 from ...errors import ShapeError
 from ...model.compatibility import forced
 from ...model.controls import a_control
-from . import parts
+from . import single
 from .option import No, Option
 
 if TYPE_CHECKING:
@@ -186,7 +186,7 @@ class RunOptions(TypedDict, total=False):
             """quantities to record of every saved state, ``run.recorded``: "energy", those that the system names in its
             ``quantities``, and what a sampled controller sets, as it was held up to there; nothing if None. Bodies compute their
             energy together with the force of the next step, at little cost.""",
-            check=lambda record, asked: parts.quantities(asked.system, record),
+            check=lambda record, asked: single.quantities(asked.system, record),
             default=(),
             ways={"World": _OF_A_RUN, "sweep": No("the results of a sweep are its outcomes=, such as a function of the run")},
         ),
@@ -197,7 +197,7 @@ class RunOptions(TypedDict, total=False):
             """quantities of a state whose changes of sign are located to the accuracy of the method, ``run.events``: a function
             g(t, v, y), an ``Event``, which may also stop a member, or a list of them. Goes with fixed and adaptive steps in the
             direct form (docs/howto/events.md).""",
-            check=lambda events, asked: parts.event_list(events, asked["form"]),
+            check=lambda events, asked: single.event_list(events, asked["form"]),
             ways={
                 "World": """quantities whose changes of sign are located, as of ``integrate``; those of the last call of ``step``
                 are in ``world.events``. No event stops a member of a world; one with ``then=`` changes its state within the
@@ -213,7 +213,7 @@ class RunOptions(TypedDict, total=False):
         "StepForm | None",
         Option(
             """``"direct"``, or ``"matrix"`` for the transition matrix of a linear system (Appendix B).""",
-            check=lambda form, asked: parts.known_form(form),
+            check=lambda form, asked: single.known_form(form),
             default="direct",
             ways={
                 "adaptive": _FIXED_ONLY,
@@ -339,7 +339,7 @@ class RunOptions(TypedDict, total=False):
         "Backend | None",
         Option(
             """``"rust"``, or ``"numpy"`` for the reference.""",
-            check=lambda backend, asked: checks.known("backend", backend, parts.BACKENDS),
+            check=lambda backend, asked: checks.known("backend", backend, single.BACKENDS),
             default="rust",
             plan="backend",
             given_again=True,
@@ -356,7 +356,7 @@ class RunOptions(TypedDict, total=False):
             them. None is the CPU, or what the environment variable ``STEPWELL_DEVICE`` names. The bits are those of the CPU.
             Fixed and adaptive steps of up to some 100 000 operations; events of adaptive steps are looked for by the CPU, and the
             run is then made by the device. Needs ``pip install "stepwell[gpu]"`` (docs/howto/gpu.md).""",
-            check=lambda device, asked: parts.machine_of(device, asked["backend"]),
+            check=lambda device, asked: single.machine_of(device, asked["backend"]),
             plan="device",
             given_again=True,
             is_always_checked=True,

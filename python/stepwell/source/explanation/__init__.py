@@ -25,7 +25,7 @@ from ...runs import engine, float32
 from ...runs.engine.counted import written
 from ...runs.engine.linear import matrix_model
 from ...runs.options import Options
-from ...runs.options.parts import machine_of
+from ...runs.options.single import machine_of
 from ...runs.request import Request
 from .beside import lines_beside
 from .listing import Line, Section, line_of_matrices, lines_of_program, lines_of_tape

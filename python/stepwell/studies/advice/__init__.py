@@ -17,7 +17,7 @@ from ...model.compatibility import one_state
 from ...model.methods import Method, choice
 from ...model.systems import NBody, System
 from ...runs import float32
-from ...runs.making import quietly
+from ...runs.execution import quietly
 from ...scenes import Scene
 from ...scenes import scene as find_scene
 from ...scenes.base import quiet_run

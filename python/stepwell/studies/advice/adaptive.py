@@ -16,7 +16,7 @@ import numpy as np
 
 from ...base.arrays import Array
 from ...model.methods import Method
-from ...runs.making import quietly
+from ...runs.execution import quietly
 from ...runs.result import Run
 from .motion import Motion, looked_up
 from .trials import Trial

@@ -12,7 +12,7 @@ from ...analysis.stability import StabilityLimit
 from ...analysis.stability.limit import limit_of
 from ...model.methods import Method
 from ...runs import engine
-from ...runs.making import quietly
+from ...runs.execution import quietly
 from ...runs.result import Run
 from ...scenes.base import quiet_run
 from ..measuring.measure import grew

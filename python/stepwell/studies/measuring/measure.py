@@ -14,7 +14,7 @@ from ...errors import ArgumentError, UnsupportedError
 from ...model.compatibility import fits_together
 from ...model.methods import Method
 from ...runs import engine
-from ...runs.making import quietly
+from ...runs.execution import quietly
 from ...scenes import Scene
 from ...scenes.base import quiet_run
 from .data import Curve, Point, Timing

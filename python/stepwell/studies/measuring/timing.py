@@ -12,7 +12,7 @@ import numpy as np
 
 from ...base.arrays import Array
 from ...model.methods import Method
-from ...runs.making import quietly
+from ...runs.execution import quietly
 from ...scenes import Scene
 from .data import Timing
 

@@ -18,11 +18,11 @@ from ...reference.acceptance import Acceptance
 from ...runs import engine
 from ...runs.adaptive_options import check_times
 from ...runs.engine import PACE_NUMBERS, WAYPOINTS
+from ...runs.execution import step
+from ...runs.finding import Found
 from ...runs.findings.lost_motion import lost_in_tolerance
 from ...runs.findings.stiffness import course_of, may_be_stiff, stiff_members
 from ...runs.findings.stops import why_steps_are_short, why_stopped
-from ...runs.making import step
-from ...runs.noticed import Found
 from ...runs.options import Options
 from ...runs.options.checked import Checked
 from ...runs.options.tolerance import order_of_series

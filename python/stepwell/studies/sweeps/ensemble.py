@@ -26,12 +26,12 @@ from ...model.methods import Method
 from ...model.methods import method as find_method
 from ...model.systems import System
 from ...runs import float32
+from ...runs.finding import Found
 from ...runs.findings import is_heard, warn_of
 from ...runs.findings.lost_motion import LOST
-from ...runs.noticed import Found
 from ...runs.options import OPTIONS, named, with_options
 from ...runs.options.checked import Checked
-from . import adaptive, happenings, lengths
+from . import adaptive, event_counts, mixed_steps
 from .adaptive import Evaluations
 from .axes import OF_THE_RUN, Chunk, Grid
 from .axes import grid as a_grid
@@ -175,8 +175,8 @@ def sweep(
     every, steps, threads = asked["every"], asked["steps"], asked["threads"] or None
     kept_of_each = _outcomes(outcomes, every)
     if (located := asked["events"]) is not None:
-        located = happenings.events_of(located, kept_of_each, transient)
-        arguments["events"], kept_of_each = list(located), (*kept_of_each, happenings.Happenings(located))
+        located = event_counts.events_of(located, kept_of_each, transient)
+        arguments["events"], kept_of_each = list(located), (*kept_of_each, event_counts.EventCounts(located))
     times = None
     if paced:
         adaptive.refuse({"transient": transient, "every": every, "observe": observe})
@@ -201,7 +201,7 @@ def sweep(
     )
     first, bits, names = _probe(task, grid)
     workers = Engine(engine, 1 if machine is not None and engine is None and threads is None else threads)
-    mixed = times is None and lengths.together(first, method, kept_of_each, arguments)
+    mixed = times is None and mixed_steps.together(first, method, kept_of_each, arguments)
     shape = grid.chunk_shape(_members(task, first, grid, workers.workers, chunk), mixed=mixed)
     layout = layout_of(task, grid, first, bits, named_as)
     if taken := sorted(names & {*layout.coords, *grid.dims}):
@@ -375,7 +375,7 @@ class _Tally:
         self.found: dict[str, dict[int, Found]] = {"stiff": {}, "growth": {}, "amounts": {}}
 
     def add(self, chunk: Chunk, done: Done) -> None:
-        status = np.where(np.isin(done.results["status"].values, happenings.EVENTS), 0, done.results["status"].values)
+        status = np.where(np.isin(done.results["status"].values, event_counts.EVENTS), 0, done.results["status"].values)
         self.members += chunk.members
         if status.any():
             self.bad += int(np.count_nonzero(status))

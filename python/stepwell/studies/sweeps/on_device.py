@@ -16,7 +16,7 @@ from ...device.reductions import Observer
 from ...model.methods import Method
 from ...model.systems import System
 from ...runs import engine
-from ...runs.making import step
+from ...runs.execution import step
 from ...runs.options import Options
 from ...runs.request import Request
 from ...runs.result import Run

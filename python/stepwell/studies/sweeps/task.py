@@ -19,22 +19,22 @@ from ...model.methods import Method
 from ...model.systems import System
 from ...model.systems.base import a_system
 from ...runs import engine
+from ...runs.execution import quietly, step
+from ...runs.finding import Finding, Found
 from ...runs.findings import may_gain
 from ...runs.findings.algebraic import lost_equations
 from ...runs.findings.gain import gain_of
 from ...runs.findings.growth import of_last_piece
 from ...runs.findings.negative import of_a_run
 from ...runs.findings.strong_control import of_a_strong_control
-from ...runs.making import quietly, step
-from ...runs.noticed import Finding, Found
 from ...runs.options import OPTIONS, Options
-from ...runs.options.parts import spread
 from ...runs.request import Request
 from ...runs.result import Run
+from ...runs.start import spread
 from .adaptive import NUMBERS_OF_A_CONTROLLER, Pieces, lost, numbers_of_waypoints
 from .axes import OF_THE_RUN
 from .exponents import Exponents
-from .lengths import Lengths
+from .mixed_steps import Lengths
 from .observed import Piece, Rows
 from .outcomes import Function, History, Outcome, ReducedOutcome, Results, Variable, together
 

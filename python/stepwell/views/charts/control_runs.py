@@ -16,7 +16,7 @@ from ...model import controls
 from ...model.methods import Method
 from ...model.systems import System
 from ...runs import engine
-from ...runs.making import quietly
+from ...runs.execution import quietly
 from ...runs.result import Run
 
 #: States of a run, evenly spaced, that are saved to measure energy, lengths and coordinates.

@@ -20,7 +20,7 @@ from ...model.compatibility import fits_together, one_state
 from ...model.methods import Method
 from ...model.methods import of_operations as find_method
 from ...model.systems import Oscillator
-from ...runs.making import step
+from ...runs.execution import step
 from ...runs.options import Options
 from ...runs.request import Request
 from .zplane import within

@@ -18,7 +18,7 @@ from ...model.compatibility import fits_together
 from ...model.controls import NormControl, Projection
 from ...model.methods import Method, choice
 from ...model.systems import RigidBody
-from ...runs.making import quietly
+from ...runs.execution import quietly
 from ...runs.result import Run
 
 #: Default methods: of first, second and fourth order. False Euler steps a steady turn as Standard Euler does.

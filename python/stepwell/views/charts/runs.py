@@ -17,8 +17,8 @@ from ...base.pictures import Drawn
 from ...base.tables import Table
 from ...errors import ArgumentError, DTypeError, ShapeError, UnsupportedError
 from ...runs.encounters import MAX_RERUN
+from ...runs.execution import quietly
 from ...runs.findings.invariants import keeps_energy
-from ...runs.making import quietly
 from ...runs.result import Run
 from ...scenes import Scene
 from ...scenes import scene as find_scene

@@ -18,9 +18,9 @@ from ...base import paths
 from ...base.pictures import new_figure
 from ...errors import ArgumentError
 from ...model.controls import WAYS, AnyControl, EnergyControl, Projection
-from ...runs.making import noticing
+from ...runs.execution import noticing
 from ...runs.options import Options
-from ...runs.options.parts import FORMS
+from ...runs.options.single import FORMS
 from ...runs.request import Request
 from ...runs.result import Run
 from ...scenes import Scene

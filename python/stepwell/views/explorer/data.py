@@ -17,7 +17,7 @@ from ...errors import StepwellError, UnsupportedError
 from ...model.controls import AnyControl
 from ...model.methods import Method
 from ...model.methods import of_operations as find_method
-from ...runs.making import quietly
+from ...runs.execution import quietly
 from ...runs.options import Options
 from ...runs.request import Request
 from ...runs.result import Run

@@ -6,7 +6,7 @@ import numpy as np
 
 from ...analysis.stability import stability_limit
 from ...model.systems.aircraft import Aircraft
-from ...runs.making import quietly
+from ...runs.execution import quietly
 from . import Finding, Section
 from .pictures import motion
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from ...model.controls import LengthControl, NormControl, Projection
 from ...model.systems import NBody, Oscillator, Pendulum3D, RigidBody, Springs
-from ...runs.making import quietly
+from ...runs.execution import quietly
 from ...scenes import scene
 from ...studies.advice import advise
 from ..charts import control as control_chart

@@ -13,7 +13,7 @@ from ...base.arrays import Array
 from ...model.methods import method
 from ...model.surfaces import Floor
 from ...model.systems import LinearSystem, Oscillator, Particles, Sampled
-from ...runs.making import quietly
+from ...runs.execution import quietly
 from ..charts import style
 from ..charts.labels import title
 from . import Finding, Section

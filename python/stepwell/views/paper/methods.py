@@ -13,7 +13,7 @@ from ...analysis.stability import Analysis, analyse, criteria, stability_limit
 from ...errors import UnsupportedError
 from ...model.methods import method
 from ...model.systems import Oscillator
-from ...runs.making import quietly
+from ...runs.execution import quietly
 from ..charts import figures, verlet_friction
 from . import Finding, Section
 

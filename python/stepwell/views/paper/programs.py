@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from ...model.systems import Oscillator
-from ...runs.making import quietly
+from ...runs.execution import quietly
 from . import Finding, Section
 
 section = Section("App. B")

@@ -9,7 +9,7 @@ import numpy as np
 from ...analysis.stability import analyse
 from ...analysis.stability.analysis import KINDS
 from ...model.systems import LinearSystem, Oscillator
-from ...runs.making import quietly
+from ...runs.execution import quietly
 from ..charts import figures
 from . import Finding, Section
 

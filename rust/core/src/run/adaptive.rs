@@ -64,7 +64,7 @@ pub fn run(plan: &AdaptiveRun, arrays: Arrays, monitor: &mut dyn FnMut(f64) -> b
     }
     if plan.every > 0 {
         let kept = arrays.steps[0].len() / b.max(1);
-        expect("kept_steps", b, arrays.kept_steps.len())?;
+        expect("accepted_steps", b, arrays.accepted_steps.len())?;
         for (rows, steps) in [1, p, q].into_iter().zip(&arrays.steps) {
             expect("steps", rows * kept * b, steps.len())?;
         }
@@ -292,17 +292,17 @@ impl<'a> Worker<'a> {
         let is_new = pace.accepted > assigned.accepted && pace.accepted as i64 % every == 0;
         assigned.accepted = pace.accepted;
         if is_new {
-            let (row, member, state) = (assigned.kept_steps, assigned.member, self.group.state(lane));
+            let (row, member, state) = (assigned.accepted_steps, assigned.member, self.group.state(lane));
             let (v, y) = state.split_at(self.plan.v.len());
             for (rows, block) in part.steps.iter_mut().zip([&[pace.t], v, y]) {
                 for (i, number) in block.iter().enumerate() {
                     rows.row(row * block.len() + i)[member] = *number;
                 }
             }
-            assigned.kept_steps += 1;
-            part.kept_steps.row(0)[member] = assigned.kept_steps as i64;
+            assigned.accepted_steps += 1;
+            part.accepted_steps.row(0)[member] = assigned.accepted_steps as i64;
         }
-        assigned.kept_steps == part.steps[0].rows()
+        assigned.accepted_steps == part.steps[0].rows()
     }
 
     /// Attempts of all members one by one, keeping where they stand before the first and after each.

@@ -80,7 +80,7 @@ pub struct Arrays<'a> {
     /// The states after accepted steps that are kept, by rows: their times, velocities and coordinates; empty if none are.
     pub steps: [&'a mut [f64]; 3],
     /// One row: how many of them each member has.
-    pub kept_steps: &'a mut [i64],
+    pub accepted_steps: &'a mut [i64],
     /// Empty; or where members stood at their last waypoints: see `run/waypoints.rs`.
     pub waypoints: &'a mut [f64],
 }
@@ -96,14 +96,14 @@ pub(super) struct Part<'a> {
     pub(super) status: Columns<'a, i64>,
     pub(super) attempt_log: Columns<'a, f64>,
     pub(super) steps: [Columns<'a, f64>; 3],
-    pub(super) kept_steps: Columns<'a, i64>,
+    pub(super) accepted_steps: Columns<'a, i64>,
     pub(super) waypoints: Columns<'a, f64>,
 }
 
 impl<'a> Arrays<'a> {
     /// The arrays, cut for shares of these numbers of members.
     pub(super) fn parts(self, b: usize, shares: Vec<usize>) -> Vec<Part<'a>> {
-        let mut whole = [self.status, self.kept_steps].map(|a| cut(a, b, &shares).into_iter());
+        let mut whole = [self.status, self.accepted_steps].map(|a| cut(a, b, &shares).into_iter());
         let [t, v, y] = self.steps;
         let mut rows = [self.saved_v, self.saved_y, self.state, self.paces, self.attempt_log, t, v, y, self.waypoints]
             .map(|a| cut(a, b, &shares).into_iter());
@@ -122,7 +122,7 @@ impl<'a> Arrays<'a> {
                     Some(y),
                     Some(waypoints),
                 ],
-                [Some(status), Some(kept_steps)],
+                [Some(status), Some(accepted_steps)],
             ) = (rows.each_mut().map(Iterator::next), whole.each_mut().map(Iterator::next))
             {
                 let steps = [t, v, y];
@@ -136,7 +136,7 @@ impl<'a> Arrays<'a> {
                     status,
                     attempt_log,
                     steps,
-                    kept_steps,
+                    accepted_steps,
                     waypoints,
                 });
             }
@@ -157,7 +157,7 @@ pub(super) struct Assignment {
     pub(super) held_before: bool,
     /// How many accepted steps it had when a step was looked at last, and how many are kept of this run.
     pub(super) accepted: f64,
-    pub(super) kept_steps: usize,
+    pub(super) accepted_steps: usize,
     /// How many accepted steps it had when a waypoint was looked for last.
     pub(super) passed: u64,
     /// States within the step that comes next, or is held, are made by steps.
@@ -175,7 +175,7 @@ impl Assignment {
             origin: None,
             held_before: false,
             accepted: 0.0,
-            kept_steps: 0,
+            accepted_steps: 0,
             passed: 0,
             by_steps: false,
             stop: None,

@@ -48,7 +48,7 @@ def events_of(events: Any, outcomes: Iterable[Outcome], transient: Any) -> tuple
     return tuple(changed(event, most=1) for event in located)
 
 
-class Happenings(ReducedOutcome):
+class EventCounts(ReducedOutcome):
     """The outcome of the events of a sweep."""
 
     observes = False

@@ -13,9 +13,9 @@ from ...model.methods import Method
 from ...model.systems import System
 from ...runs import engine
 from ...runs.options import Options
-from ...runs.options.parts import last_time
 from ...runs.request import Request
 from ...runs.result import Run
+from ...runs.start import last_time
 from .outcomes import Extremes, Last, Outcome
 
 #: The most numbers of a state: the step is one tape, whatever it would be with one length.
