@@ -15,12 +15,12 @@ from .request import Request
 from .result import Run
 from .start import block_like
 
-#: What the core says of a short run: it was not made; or it is certain that no member has grown.
+#: Return codes of the core: the run was not made; or it was, and no member has grown.
 NOT_MADE, TAME = 0, 2
 
 
 class ShortRun(ABC):
-    """A run of so few steps that all else takes longer, without its start and the numbers of its system.
+    """A prepared run of few steps, beside which all else takes longer, without its start and the numbers of its system.
 
     Attributes:
         system: the system of which it was prepared.

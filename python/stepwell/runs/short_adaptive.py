@@ -35,7 +35,7 @@ class ShortAdaptiveRun(ShortRun):
         self.shapes = (times, *request.v.shape), (times, *request.y.shape), request.v.shape, request.y.shape, shape_of_paces
         self.evaluations = engine.evaluations_of_attempt(plan)
         self.of_extra = of_extra_steps(plan, self.evaluations, dense=times > 1 or not control.pacing.begins)
-        #: Whether nothing can be found of a run but what the core checks, and of its absolute tolerance.
+        #: Whether the core's checks and that of the absolute tolerance are the only findings possible.
         self.is_plain = is_plain
         is_absolute = not plan.acceptance.own and bool((control.paces[engine.ABSOLUTE] > engine.LEAST).any())
         self.groups = engine.groups_of(plan) if is_absolute else None

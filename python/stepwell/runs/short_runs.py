@@ -60,7 +60,7 @@ class _Numbers(NamedTuple):
     numbers: Any
 
 
-#: Options of these types are what they were.
+#: Types of options that are compared by value.
 _PLAIN = frozenset({type(None), bool, int, float, str, np.float64, _Numbers})
 
 

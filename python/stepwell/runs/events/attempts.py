@@ -53,7 +53,7 @@ def attempted(
 ) -> Attempts:
     """Make attempts one by one until each member is at or past a time.
 
-    So the last step of a member is taken, which a run would hold to save states inside it.
+    Unlike a run, which holds it to save states inside it, a member takes its last step even if that passes the time.
 
     Args:
         plan: of these members, along one axis.

@@ -438,5 +438,5 @@ def _searched(run: Run, name: str, start: State, first: Array, between: State, p
 
 
 def _between(low: Array, high: Array, places: int) -> Array:
-    """This many places from one to the other, shape (places, *batch)."""
+    """Equidistant points from one to the other, shape (places, *batch)."""
     return np.asarray(low + np.linspace(0.0, 1.0, places).reshape(-1, *(1,) * np.ndim(low)) * (high - low))

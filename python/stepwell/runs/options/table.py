@@ -294,8 +294,8 @@ class RunOptions(TypedDict, total=False):
         Any,
         Option(
             """with a tolerance, times at which rates jump, shape (jumps,), or (jumps, *batch) for jumps of each member. No step
-            crosses one; behind it the step is chosen anew. Those of sampled inputs, and comparisons of your own equations with
-            the time, are known without.""",
+            crosses one; behind it the step is chosen anew. Jumps of sampled inputs, and of comparisons of your own equations
+            with the time, are found without.""",
             check=lambda jumps, asked: np.atleast_1d(checks.numbers("jumps", jumps, unit="units of time")),
             batch=lambda jumps, system: jumps.shape[1:],
             goes_on=True,
