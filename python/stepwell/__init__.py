@@ -20,7 +20,7 @@ registry.register(
     algebraic_start="stepwell.analysis.consistency:check_start",
     animate_run="stepwell.views.charts.runs_animation:animate",
     draw_advice="stepwell.views.charts.advice_picture:draw",
-    derivatives_of_rates="stepwell.analysis.derivatives.traced:of_rates",
+    derivatives_of_rates="stepwell.model.derivatives.traced:of_rates",
     draw_bode="stepwell.views.charts.bode_picture:draw",
     draw_control="stepwell.views.charts.control_picture:draw",
     draw_curves="stepwell.views.charts.zplane_picture:curves",

@@ -6,10 +6,10 @@ from typing import Any
 import numpy as np
 import pytest
 import stepwell as sw
-from stepwell.analysis.derivatives import traced
-from stepwell.analysis.derivatives.traced import Traced
 from stepwell.analysis.stability import maps
 from stepwell.errors import UnsupportedError
+from stepwell.model.derivatives import traced
+from stepwell.model.derivatives.traced import Traced
 from support.differences import central
 from support.families import family
 from support.looped import in_turn, looped

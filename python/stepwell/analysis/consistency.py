@@ -9,10 +9,10 @@ import numpy as np
 from ..base import checks
 from ..base.arrays import Array
 from ..errors import ArgumentError, UnsupportedError
+from ..model.derivatives import traced
 from ..model.systems import System
 from ..model.systems.base import a_system
 from ..reference import pivoting
-from .derivatives import traced
 from .stability import maps
 
 #: The most passes of Newton's method. Each doubles the number of right digits; a start far off may need some more.

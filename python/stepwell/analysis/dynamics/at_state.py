@@ -11,9 +11,9 @@ from ...base import checks
 from ...base.arrays import Array, Shape
 from ...base.immutable import ValueEquality
 from ...base.reprs import cell, counted, facts, table
+from ...model.derivatives import traced
 from ...model.systems import System
 from ...model.systems.base import a_system
-from ..derivatives import traced
 from ..stability import eigen, maps
 from ..stability.analysis import velocities
 from ..stability.eigen import Complex

@@ -21,6 +21,7 @@ from ...base.interrupts import POLL, available
 from ...base.reprs import cell, counted, facts, share
 from ...errors import ArgumentError, DivergenceWarning, ShapeError, UnsupportedError
 from ...model.compatibility import fits_together, one_state
+from ...model.derivatives.traced import Traced, together
 from ...model.methods import Method
 from ...model.methods import of_operations as find_method
 from ...model.systems import System
@@ -32,7 +33,6 @@ from ...runs import engine
 from ...runs.adaptive_options import check_times
 from ...runs.events.members import Members
 from ...runs.execution import quietly
-from ..derivatives.traced import Traced, together
 from ..stability import maps
 from ..stability.analysis import velocities
 from .variational import Variational

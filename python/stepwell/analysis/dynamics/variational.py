@@ -9,6 +9,7 @@ import numpy as np
 from ... import _core
 from ...base.arrays import Array, Shape
 from ...errors import UnsupportedError
+from ...model.derivatives.traced import Traced
 from ...model.equations.series import derivatives_of_functions
 from ...model.inputs import Input
 from ...model.parameters import CoreParameters, flat
@@ -16,7 +17,6 @@ from ...model.systems import System
 from ...model.systems.own import RATES
 from ...reference.tape.evaluate import Evaluation
 from ...reference.traced import Tracer
-from ..derivatives.traced import Traced
 from ..stability import maps
 
 #: The most operations of the rates and of the rates of all disturbances together.

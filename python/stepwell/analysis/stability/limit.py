@@ -24,12 +24,12 @@ from ...base.arrays import Array, Shape
 from ...base.reprs import share
 from ...errors import AccuracyWarning, UnsupportedError
 from ...model.compatibility import fits_together, one_state
+from ...model.derivatives import traced
 from ...model.methods import Method
 from ...model.methods import method as find_method
 from ...model.systems import LinearSystem, Springs, System
 from ...model.systems.base import a_system
 from ...model.systems.own import OwnSystem
-from ..derivatives import traced
 from . import exact, maps
 from .analysis import state, state_argument
 from .eigen import EPS

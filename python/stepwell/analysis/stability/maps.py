@@ -14,12 +14,12 @@ import numpy as np
 from ...base import checks
 from ...base.arrays import Array, Blocks, Shape
 from ...model.compatibility import one_state
+from ...model.derivatives import traced
 from ...model.methods import Method
 from ...model.parameters import aligned
 from ...model.systems import System
 from ...runs import engine
 from ...runs.engine import exact, linear
-from ..derivatives import traced
 
 #: The step ε of derivatives by the complex step, f'(x) = Im f(x + iε)/ε. Its square is below the smallest number, so they have no
 #: truncation error.

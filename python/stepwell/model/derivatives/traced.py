@@ -13,12 +13,12 @@ from ..._core import Symbol, Tape
 from ...base import checks
 from ...base.arrays import Array, Shape
 from ...errors import ShapeError, UnsupportedError
-from ...model.methods import Method
-from ...model.systems import System
 from ...reference.marks import Marks, recording
 from ...reference.tape.evaluate import Evaluation
 from ...reference.tape.modes import directional, jacobian
 from ...reference.traced import Tracer
+from ..methods import Method
+from ..systems import System
 
 #: Operations whose values change in time; and operations without branches, which are analytic: a result of these that is constant
 #: in some region is constant everywhere.
