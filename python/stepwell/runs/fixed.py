@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -11,7 +12,7 @@ from .. import _core
 from ..base import buffer_pool, checks
 from ..base.arrays import Array
 from ..model.systems import NBody
-from . import encounters, engine
+from . import engine
 from .request import Request
 from .result import Run
 
@@ -34,9 +35,17 @@ def fixed_run(request: Request) -> Run:
     else:
         out = make(plan)
     collides, alone = isinstance(request.system, NBody), plan.of_core()  # the rates of bodies do not depend on the time
+    finds: dict[str, Any] = {}
     if collides:
+        from . import encounters  # only such runs need it
+
         # ``collisions`` and ``encounters`` need the start later, and the user may change the arrays meanwhile.
         v, y = _small_copy(v), _small_copy(y)
+        finds = {
+            "collision": partial(encounters.collision, alone, v, y, carried),
+            "encounter": partial(encounters.of_member, alone, v, y, carried, plan.steps),
+            "overshoots": partial(encounters.overshoots, alone, v, y, carried, plan.steps),
+        }
     run = Run(
         t=_times(plan),
         v=out.v,
@@ -53,9 +62,7 @@ def fixed_run(request: Request) -> Run:
         steps=plan.steps,
         start=request.start,
         fused=plan.fused,
-        collision=partial(encounters.collision, alone, v, y, carried) if collides else None,
-        encounter=partial(encounters.of_member, alone, v, y, carried, plan.steps) if collides else None,
-        overshoots=partial(encounters.overshoots, alone, v, y, carried, plan.steps) if collides else None,
+        **finds,
         recorded=out.recorded,
         work=out.work,
         force=plan.force,

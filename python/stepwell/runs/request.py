@@ -35,7 +35,6 @@ from . import continuation, engine
 from .options import Options
 from .options.checked import Checked, refuse
 from .options.single import check_matrix_form
-from .options.tolerance import order_of_series, tolerances_of
 from .start import (
     check_algebraic,
     checked_system,
@@ -210,6 +209,7 @@ class Request(NamedTuple):
         """A run in which every member has steps of its own."""
         from . import adaptive_options  # only such runs need them
         from .options import positive
+        from .options.tolerance import order_of_series, tolerances_of
 
         method, system, v = checked_system(system, method, options.v, options.y)
         if before is not None:

@@ -16,7 +16,6 @@ from ..base.reprs import MAX_LINE, counted, facts, shortened
 from ..errors import ArgumentError, UnsupportedError
 from ..model.methods import Method
 from ..model.systems import System
-from .encounters import Collision, Encounter
 from .finding import Finding
 
 if TYPE_CHECKING:
@@ -26,6 +25,7 @@ if TYPE_CHECKING:
     from pandas import DataFrame
     from xarray import Dataset
 
+    from .encounters import Collision, Encounter
     from .occurrences import Occurrences
 
 

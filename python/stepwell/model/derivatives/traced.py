@@ -40,8 +40,21 @@ _jacobians: dict[str, Evaluation] = {}
 MAX_WHOLE = 20_000
 
 
+class _Placed:
+    """A tape whose numbers of the state have other places."""
+
+    def __init__(self, tape: Tape, places: Sequence[int]) -> None:
+        self._tape, self._places = tape, places
+
+    def state(self, number: int) -> Symbol:
+        return self._tape.state(self._places[number])
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._tape, name)
+
+
 class Traced:
-    """Values that depend on a system's state, on a tape of their own.
+    """Values that depend on a system's state, on a tape of their own; ``places`` are those of its numbers on the tape, v first.
 
     Attributes:
         system: the system.
@@ -52,13 +65,14 @@ class Traced:
         length: how many numbers a state has.
     """
 
-    def __init__(self, system: System, what: str, method: Method | None = None) -> None:
+    def __init__(self, system: System, what: str, method: Method | None = None, places: Sequence[int] | None = None) -> None:
         self.system = system
         self.tape = Tape()
         self.marks: Marks = {}
         self.length = prod(system.v_shape) + prod(system.y_shape)
-        self.state = [self.tape.state(i) for i in range(self.length)]
-        tracer = Tracer(system, self.tape)
+        places = range(self.length) if places is None else places
+        self.state = [self.tape.state(place) for place in places]
+        tracer = Tracer(system, self.tape if places == range(self.length) else _Placed(self.tape, places))
         with recording(self.marks):
             self.roots = _roots(tracer, what, method)[: self.length]
         if len(self.roots) != self.length:

@@ -10,6 +10,7 @@ import os
 import threading
 
 from ... import _core
+from ...base.arrays import Array, Whole
 from .adaptive import (
     ABSOLUTE,
     BLIND,
@@ -57,9 +58,9 @@ from .adaptive import (
     paces,
     pacing_of_core,
 )
-from .direct import to_slot
-from .forms import advance, model
+from .direct import advance_direct, first_bad_steps, to_slot
 from .plan import Arrays, Outcome, Plan, Watched, pushes
+from .plan import model as model_of_operations
 
 __all__ = [
     "ABSOLUTE",
@@ -125,3 +126,25 @@ if hasattr(os, "register_at_fork"):
         after_in_parent=lambda: _others.clear(),
         after_in_child=lambda: _core.forget() if _others.pop() else None,
     )
+
+
+def model(plan: Plan) -> _core.ModelSpec:
+    """The model of a plan, as the core takes it."""
+    if plan.method.is_exact:
+        from . import linear  # only such runs need it
+
+        spec: _core.ModelSpec = linear.exact_model(plan)
+        return spec
+    return model_of_operations(plan)
+
+
+def advance(plan: Plan, v: Array, y: Array, before: Whole | None = None, *, carried: bool = False) -> Outcome:
+    """Make the run. ``v`` is what the method carries if ``carried``; v and y have the shape of a block and the batch.
+
+    ``before`` has the first bad steps of earlier runs, −1 for members that were finite so far.
+    """
+    if plan.form == "direct":
+        return advance_direct(plan, v, y, before, carried=carried)
+    from . import linear  # only such runs need it
+
+    return linear.by_matrix(plan, v, y, first_bad_steps(plan, before), carried)
