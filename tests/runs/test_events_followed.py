@@ -9,6 +9,7 @@ import pytest
 import stepwell as sw
 from stepwell.reference import events as reference_events
 from stepwell.runs.events import adaptive, driver
+from support.own_methods import adams_bashforth_2
 from support.ways import assert_same_run
 
 #: Events of two coordinates: resets, a floor of an empty tank, an exchange, a kick, one that only is noted, one that stops.
@@ -69,17 +70,6 @@ def driven(t: Any, v: Any, y: Any, *, k: float = 1.0, f: float = 0.5, w: float =
 @sw.system(order=2)
 def undamped(t: Any, v: Any, y: Any, *, k: float = 1.0, f: float = 0.5, w: float = 1.0) -> Any:
     return -k * y + f * np.sin(w * t)
-
-
-def a_step_before(s: Any, t: Any, h: Any, v: Any, y: Any) -> Any:
-    dv, dy = s.dv(t, v, y), s.dy(t, v, y)
-    return s.dv(t - h, v - dv, y - dy), s.dy(t - h, v - dv, y - dy)
-
-
-@sw.method(start=a_step_before)
-def adams_bashforth_2(s: Any, t: Any, h: Any, v: Any, y: Any, dv_before: Any, dy_before: Any) -> Any:
-    dv, dy = s.dv(t, v, y), s.dy(t, v, y)
-    return v + 1.5 * dv - 0.5 * dv_before, y + 1.5 * dy - 0.5 * dy_before, dv, dy
 
 
 #: Methods that carry something else than v between steps, or keep more.
@@ -405,20 +395,6 @@ def test_trials_of_fused_attempts_fuse_what_attempts_do(method: str) -> None:
     run, reference = (sw.integrate(system, method, backend=backend, **options) for backend in ("rust", "numpy"))
     assert np.sum(run.events["passed"].count) > 10
     assert_same_run(run, reference)
-
-
-def test_a_ball_comes_to_rest_as_the_reference_says() -> None:
-    """Bounces with restitution 0.5 have a limit in time, and lie there: the series is summed, in one step and over many parts."""
-    falling = sw.system(order=2)(lambda t, v, y: -1.0 + 0.0 * y)()
-    bounce = sw.Event(lambda t, v, y: y, direction=-1, then=lambda t, v, y: (-0.5 * v, y), name="bounce")
-    for method, steps in (("rk4", {"dt": 0.37, "steps": 20}), ("merson", {"tolerance": 1e-6, "at": [6.0]})):
-        options: Any = {"v": [0.0, 0.5], "y": [0.5, 0.25], "events": bounce, **steps}
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", sw.EventWarning)
-            run, reference = (sw.integrate(falling, method, backend=backend, **options) for backend in ("rust", "numpy"))
-        assert_same_run(run, reference)
-        assert [str(each) for each in run.findings] == [str(each) for each in reference.findings]
-        assert np.all(run.status == sw.Status.REST), method
 
 
 @pytest.mark.parametrize("backend", ["rust", "numpy"])
