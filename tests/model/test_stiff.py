@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 from fractions import Fraction
 from functools import cache
@@ -276,14 +275,6 @@ def test_the_twenty_species_of_another_program() -> None:
     assert run.y[-1] == pytest.approx(found.y[:, -1], rel=1e-9)
 
 
-def test_an_explicit_run_of_it_is_told_that_it_is_stiff() -> None:
-    with pytest.warns(sw.ToleranceWarning) as caught:
-        sw.integrate(POLLU, "merson", y=START, tolerance=(1e-4, 1e-9), at=[60.0], max_steps=3000)
-    (text,) = (str(each.message) for each in caught)
-    assert "held down by stability and not by accuracy" in text
-    assert '"rodas4" is stable there' in text
-
-
 @pytest.mark.parametrize("name", stiff.PROBLEMS)
 @pytest.mark.parametrize("method", ABLE)
 def test_reference_values(name: str, method: str) -> None:
@@ -326,18 +317,3 @@ def test_a_system_that_is_too_large_is_refused_before_work(method: str) -> None:
         step(sw.NBody(np.ones(200)), 200, 2)
     with pytest.raises(sw.errors.UnsupportedError, match=r"have 4098 unknowns .* may have 4096 and"):
         step(sw.Chain(2049), 2049)
-
-
-def test_stiff_springs_at_sixty_frames_a_second() -> None:
-    """A hanging chain whose springs are a hundred times as stiff as leapfrog bears at 60 Hz."""
-    n, dt = 12, 1 / 60
-    limit = float(sw.stability_limit(sw.Chain(n, stiffness=1.0), "leapfrog"))
-    stiffness = 100.0 * (limit / dt) ** 2
-    chain = sw.Chain(n, stiffness=stiffness)
-    assert sw.stability_limit(chain, "leapfrog") == pytest.approx(dt / 10, rel=1e-9)
-    start = {"v": np.zeros(n), "y": 1e-3 * np.random.default_rng(1).normal(size=n)}
-    run = sw.integrate(chain, "linearly_implicit_euler", **start, dt=dt, steps=600, every=60)
-    energy = [float(chain.energy(v, y)) for v, y in zip(run.v, run.y, strict=True)]
-    assert all(later < 1e-10 * earlier for earlier, later in itertools.pairwise(energy[:6]))
-    kept = sw.integrate(chain, "implicit_midpoint", **start, dt=dt, steps=600)
-    assert float(chain.energy(kept.v[-1], kept.y[-1])) == pytest.approx(energy[0], rel=1e-8)
