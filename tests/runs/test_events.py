@@ -1025,28 +1025,18 @@ def test_a_tank_back_in_time(steps: dict[str, Any]) -> None:
 
 PASSING: list[tuple[Any, sw.Event, dict[str, Any]]] = [
     # A dose of zero at a time, and a kick of zero where a member passes: the state stays as it is, but nothing leads back.
-    (
-        sw.system(order=1)(lambda t, c, *, dose=0.0: -0.3 * c),
-        sw.Event(lambda t, c: np.sin(t), then=lambda t, c, *, dose: c + dose, name="event"),
-        {"y": 1.0},
-    ),
-    (
-        sw.system(lambda t, v, y, *, kick=0.0: -y),
-        sw.Event(lambda t, v, y: y, direction=-1, then=lambda t, v, y, *, kick: (v - kick, y), name="event"),
-        {"v": 0.0, "y": 1.0},
-    ),
+    (sw.system(order=1)(lambda t, c, *, dose=0.0: -0.3 * c),
+     sw.Event(lambda t, c: np.sin(t), then=lambda t, c, *, dose: c + dose, name="event"), {"y": 1.0}),
+    (sw.system(lambda t, v, y, *, kick=0.0: -y),
+     sw.Event(lambda t, v, y: y, direction=-1, then=lambda t, v, y, *, kick: (v - kick, y), name="event"), {"v": 0.0, "y": 1.0}),
     # A clock whose amplitude is set anew where it turns, and a heater that is too weak: the state is another one there.
-    (
-        sw.system(lambda t, v, y: -9.0 * y - 0.1 * v),
-        sw.Event(lambda t, v, y: v, direction=-1, then=lambda t, v, y: (0.0 * v, 1.0 + 0.0 * y), name="event"),
-        {"v": 1.0, "y": 0.0},
-    ),
-    (
-        sw.system(order=1, shape=(2,))(lambda t, y: np.array([10.0 - y[0] + y[1], 0.0])),
-        sw.Event(lambda t, y: y[0] - 20.0, direction=-1, then=lambda t, y: np.array([20.0, 1.0]), name="event"),
-        {"y": np.array([25.0, 0.0])},
-    ),
-]
+    (sw.system(lambda t, v, y: -9.0 * y - 0.1 * v),
+     sw.Event(lambda t, v, y: v, direction=-1, then=lambda t, v, y: (0.0 * v, 1.0 + 0.0 * y), name="event"),
+     {"v": 1.0, "y": 0.0}),
+    (sw.system(order=1, shape=(2,))(lambda t, y: np.array([10.0 - y[0] + y[1], 0.0])),
+     sw.Event(lambda t, y: y[0] - 20.0, direction=-1, then=lambda t, y: np.array([20.0, 1.0]), name="event"),
+     {"y": np.array([25.0, 0.0])}),
+]  # fmt: skip
 
 
 @pytest.mark.parametrize(("method", "steps"), DRIVES)
