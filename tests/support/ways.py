@@ -215,10 +215,6 @@ def in_a_world(asked: Asked) -> None:
     same_arrays(world.y, asked.run.y[-1], "y")
 
 
-def on_a_device(asked: Asked) -> None:
-    assert_same_run(asked.make(device="opencl"), asked.run)
-
-
 Way = Callable[[Asked], None]
 
 #: All ways of the core by their names.
