@@ -2,6 +2,7 @@
 
 import itertools
 import warnings
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -77,7 +78,7 @@ CARRYING: tuple[Any, ...] = ("verlet", "leapfrog", adams_bashforth_2)
 #: Ways to make such a run with a tolerance.
 ADAPTIVE_WAYS: dict[str, dict[str, Any]] = {
     "three times": {"at": [0.7, 1.5, 2.0]},
-    "many times": {"at": np.linspace(0.05, 2.0, 40)},
+    "many times": {"at": np.linspace(0.05, 2.0, 24)},
     "back": {"at": [-0.7, -2.0]},
     "two tolerances": {"at": [2.0], "tolerance": (1e-6, 1e-9)},
     "few attempts": {"at": [1.0, 2.0], "max_steps": 15},
@@ -131,7 +132,7 @@ def drawn_options(
 
 
 def check_the_core_follows_as_the_reference_does(
-    numbers: range, way: str | None = None, known: bool = False, **more: Any
+    numbers: Sequence[int], way: str | None = None, known: bool = False, **more: Any
 ) -> None:
     occurred, rested = 0, 0
     with warnings.catch_warnings():
@@ -154,20 +155,21 @@ def test_the_core_follows_as_the_reference_does(part: int) -> None:
 @pytest.mark.parametrize("way", [None, "three times", "many times", "back", "jumps"])
 def test_with_known_times_too(way: str | None) -> None:
     check_the_core_follows_as_the_reference_does(
-        range(100, 132 if way is None else 110) if way != "jumps" else range(140, 150), way, known=True
+        range(100, 132 if way is None else 107) if way != "jumps" else range(140, 150), way, known=True
     )
 
 
 @pytest.mark.parametrize("way", [None, "three times", "many times", "back", "jumps"])
 @pytest.mark.parametrize("more", [{"fused": True}, {"held": True}, {"held": True, "fused": True}], ids=str)
 def test_fused_steps_and_sampled_inputs_too(more: dict[str, Any], way: str | None) -> None:
-    numbers = range(201, 233, 2 if "held" in more else 1) if way is None else range(201, 204 if "held" not in more else 207, 2)
+    # Of an adaptive run the samples of each member or of all, at intervals of 0.1 or of 0.37.
+    numbers = range(201, 225, 2 if "held" in more else 1) if way is None else (201, 207 if "held" in more else 203)
     check_the_core_follows_as_the_reference_does(numbers, way, **more)
 
 
 @pytest.mark.parametrize("more", [{}, {"fused": True}, {"known": True}], ids=str)
 def test_float32_too(more: dict[str, Any]) -> None:
-    check_the_core_follows_as_the_reference_does(range(240, 260), dtype="float32", **more)
+    check_the_core_follows_as_the_reference_does(range(240, 253), dtype="float32", **more)
 
 
 @pytest.mark.parametrize(("way", "fused"), [("many times", False), ("back", False), ("jumps", True)])
@@ -176,7 +178,7 @@ def test_runs_that_go_on_too(way: str, fused: bool) -> None:
     occurred = 0
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        for number in range(300, 302 if fused else 306):
+        for number in range(300, 302 if fused else 304):
             system, method, options = drawn_options(number, way, number % 3 == 0, None)
             state = {name: options.pop(name) for name in ("v", "y") if name in options}
             at, tolerance = options.pop("at"), options.pop("tolerance")
@@ -208,13 +210,13 @@ def test_methods_that_carry_something_else_than_v_too(method: Any) -> None:
 
     for number, known in itertools.product(range(1, 30, 4 if method == "verlet" else 8), (False, True)):
         assert_equal(lambda backend, of=(number, known): drawn(of[0], backend, None, of[1], method))
-    pushed = sw.system(order=2)(lambda t, v, y, *, f=1.0: f * np.sin(t) - 1.0)(f=np.linspace(0.0, 2.0, 7))
+    pushed = sw.system(order=2)(lambda t, v, y, *, f=1.0: f * np.sin(t) - 1.0)(f=np.linspace(0.0, 2.0, 5))
     floor = sw.Event(lambda t, v, y: y, direction=-1, then=lambda t, v, y: (np.maximum(v, 0.0), np.maximum(y, 0.0)), name="floor")
     kick = sw.Event(times=1.3, period=1.1, then=lambda t, v, y: (v + 0.9, y), name="kick")
     rested = 0
-    for events in ([OF_A_PLACE["bounce"]()], [OF_A_PLACE["soft"]()], [floor], [floor, kick], [floor, OF_A_PLACE["top"]()]):
+    for events in ([OF_A_PLACE["bounce"]()], [OF_A_PLACE["soft"]()], [floor, kick], [floor, OF_A_PLACE["top"]()]):
         for dt, every in ((0.3, 1), (0.05, None), (0.1, 3))[: 2 if method == "verlet" else 1]:
-            options: Any = {"v": np.zeros(7), "y": np.linspace(0.0, 1.0, 7), "dt": dt, "steps": round(9.0 / dt), "every": every}
+            options: Any = {"v": np.zeros(5), "y": np.linspace(0.0, 1.0, 5), "dt": dt, "steps": round(9.0 / dt), "every": every}
             run = assert_equal(lambda backend, o=options, e=events: sw.integrate(pushed, method, events=e, backend=backend, **o))
             rested += int((run.status == sw.Status.REST).sum())
     assert rested > 10
