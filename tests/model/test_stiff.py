@@ -236,7 +236,8 @@ MOST = {"rosenbrock23": 10.0, "rodas4": 0.1, "rodas5p": 0.1}
 def test_adaptive_steps_keep_their_tolerance(method: str, tolerance: float) -> None:
     """Of the longest that the state has been at least; the condition of the eigenvectors bounds what an error may grow by."""
     shares = []
-    for (A, s, _), true in zip(drawn(), truths(), strict=True):
+    few = 4 if method == "rosenbrock23" else 1  # whose steps are many
+    for (A, s, _), true in list(zip(drawn(), truths(), strict=True))[::few]:
         run = sw.integrate(LinearSystem(A, velocities=0), method, y=s, tolerance=tolerance, at=[TIME], every=1)
         assert run.status == sw.Status.OK
         allowed = tolerance * np.linalg.norm(run.y, axis=1).max() * np.linalg.cond(np.linalg.eig(A)[1])
