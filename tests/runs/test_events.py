@@ -25,6 +25,13 @@ from support.families import family
 from support.refusals import refused
 from support.ways import assert_equal_ways, assert_same_run
 
+
+@pytest.fixture
+def without_core(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Events are looked for here, as where the core cannot: mistakes that are made in Python count."""
+    monkeypatch.setattr(by_core, "sought", lambda *_: None)
+
+
 DIRECT = [case for case in cases() if case.form == "direct"]
 #: Of a method of each structure the case with the lowest number.
 OF_FEW = {min((case for case in DIRECT if case.method == name), key=number) for name in FEW}
@@ -633,6 +640,7 @@ def test_wrong_events_of_worlds() -> None:
 
 
 @pytest.mark.mutant
+@pytest.mark.usefixtures("without_core")
 def test_mistake_the_quantity_of_the_last_call_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
     right, quantities = Frames._quantities, {}
 
@@ -669,6 +677,7 @@ def test_mistake_the_length_of_another_step_is_noticed(method: str, monkeypatch:
 
 
 @pytest.mark.mutant
+@pytest.mark.usefixtures("without_core")
 def test_mistake_what_comes_after_the_end_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
     class Wrong(adaptive._Driver):
         def __init__(self, *arguments: Any) -> None:
@@ -688,6 +697,7 @@ def test_mistake_what_comes_after_the_end_is_noticed(monkeypatch: pytest.MonkeyP
 
 
 @pytest.mark.mutant
+@pytest.mark.usefixtures("without_core")
 def test_mistake_what_came_before_the_piece_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
     look = adaptive._Driver._look
     monkeypatch.setattr(adaptive._Driver, "_look", lambda self, *arguments: look(self, *arguments[:-1], False))
@@ -696,6 +706,7 @@ def test_mistake_what_came_before_the_piece_is_noticed(monkeypatch: pytest.Monke
 
 
 @pytest.mark.mutant
+@pytest.mark.usefixtures("without_core")
 def test_mistake_attempts_after_the_end_or_one_too_few_are_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
     right = adaptive._Driver.stepped
 
@@ -1083,6 +1094,7 @@ def test_mistake_an_event_that_leaves_the_state_as_it_is_is_noticed() -> None:
 
 
 @pytest.mark.mutant
+@pytest.mark.usefixtures("without_core")
 def test_mistake_a_member_that_forgets_from_which_side_it_came_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
     """Then a ball at the ground, whose height is a rounding below it, falls through, or bounces again at once."""
     right = adaptive._Resetting.parts
@@ -1099,6 +1111,7 @@ def test_mistake_a_member_that_forgets_from_which_side_it_came_is_noticed(monkey
 
 
 @pytest.mark.mutant
+@pytest.mark.usefixtures("without_core")
 def test_mistake_neighbours_that_begin_anew_are_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
     """Without their carry members of a leapfrog world would have other bits where another bounces."""
 
