@@ -20,17 +20,10 @@ from stepwell.runs.events.members import Members
 from stepwell.runs.events.traced import Quantity
 from stepwell.runs.events.trials import AdaptiveTrials, Trials, one_step
 from support.cases import SYSTEMS, Case, assert_same, cases, number, representative
-from support.events import ABLE, FEW, GRAVITY, U, assert_same_events, crossing, passing
+from support.events import ABLE, FEW, GRAVITY, U, assert_same_events, crossing, passing, without_core  # noqa: F401
 from support.families import family
 from support.refusals import refused
 from support.ways import assert_equal_ways, assert_same_run
-
-
-@pytest.fixture
-def without_core(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Events are looked for here, as where the core cannot: mistakes that are made in Python count."""
-    monkeypatch.setattr(by_core, "sought", lambda *_: None)
-
 
 DIRECT = [case for case in cases() if case.form == "direct"]
 #: Of a method of each structure the case with the lowest number.
