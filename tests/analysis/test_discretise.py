@@ -331,11 +331,8 @@ WRONG: list[tuple[Any, type[Exception], str]] = [
     (lambda: sw.discretise(SYSTEM, 0.1, "zoh", interpolation="linear"), ArgumentError, "'zoh' says how the input runs"),
     (lambda: sw.discretise(SYSTEM, 0.1, "rk4", interpolation="cubic"), UnknownNameError, "interpolation: there is no 'cubic'"),
     (lambda: sw.discretise(SYSTEM, 0.1, prewarp=1.0), ArgumentError, "prewarp: expected None for 'zoh'"),
-    (
-        lambda: sw.discretise(SYSTEM, 0.1, "tustin", prewarp=40.0),
-        ArgumentError,
-        "prewarp: expected a frequency below that of half",
-    ),
+    (lambda: sw.discretise(SYSTEM, 0.1, "tustin", prewarp=40.0), ArgumentError,
+     "prewarp: expected a frequency below that of half"),
     (lambda: sw.discretise(SYSTEM, 0.1, delay=-0.1), ArgumentError, "delay: expected a dead time of zero or more, got -0.1"),
     (lambda: sw.discretise(SYSTEM, 0.1, delay=[0.1, 0.2]), ShapeError, "delay: expected one number"),
     (lambda: sw.discretise(SYSTEM, 0.1, delay=1e9), ArgumentError, "delay, dt: expected a dead time of at most 10000 samples"),
@@ -346,31 +343,19 @@ WRONG: list[tuple[Any, type[Exception], str]] = [
     (lambda: sw.frequency_response(SYSTEM, "omega"), ArgumentError, "omega: expected real numbers"),
     (lambda: sw.frequency_response(sw.LinearSystem([[1.0]]), 1.0), ArgumentError, "without inputs (B)"),
     (lambda: sw.margins(SYSTEM, delay=-1.0), ArgumentError, "delay: expected a time of zero or more, got -1"),
-    (
-        lambda: sw.margins(sw.discretise(SYSTEM, 0.1), delay=0.1),
-        ArgumentError,
-        "delay: a DiscreteSystem has its dead time within",
-    ),
-    (
-        lambda: sw.discretise(SYSTEM, 0.1) * sw.discretise(SYSTEM, 0.2),
-        ArgumentError,
-        "dt: expected two systems with the same, got",
-    ),
+    (lambda: sw.margins(sw.discretise(SYSTEM, 0.1), delay=0.1), ArgumentError,
+     "delay: a DiscreteSystem has its dead time within"),
+    (lambda: sw.discretise(SYSTEM, 0.1) * sw.discretise(SYSTEM, 0.2), ArgumentError,
+     "dt: expected two systems with the same, got"),
     (lambda: SYSTEM * sw.discretise(SYSTEM, 0.1), DTypeError, "expected another one of samples, got one of continuous time"),
     (lambda: sw.discretise(SYSTEM, 0.1) - SYSTEM, DTypeError, "expected another one of samples"),
-    (
-        lambda: sw.LinearSystem(sw.TransferFunction(1.0, [1.0, 1.0])),
-        DTypeError,
-        "A: expected a matrix, got a system, TransferFunc",
-    ),
-    (
-        lambda: sw.LinearSystem(signal.lti([1.0], [1.0, 1.0])),
-        DTypeError,
-        "LinearSystem.of(TransferFunctionContinuous(…)) takes it",
-    ),
+    (lambda: sw.LinearSystem(sw.TransferFunction(1.0, [1.0, 1.0])), DTypeError,
+     "A: expected a matrix, got a system, TransferFunc"),
+    (lambda: sw.LinearSystem(signal.lti([1.0], [1.0, 1.0])), DTypeError,
+     "LinearSystem.of(TransferFunctionContinuous(…)) takes it"),
     (lambda: sw.margins(sw.Oscillator()), ShapeError, "loop: expected one input, one output and one member, got 2 inputs"),
     (lambda: sw.margins(np.ones(2) * SYSTEM), ShapeError, "got a batch (2,)"),
-]
+]  # fmt: skip
 
 
 def test_what_is_refused() -> None:

@@ -214,22 +214,13 @@ def test_the_run_of_a_loop_is_that_of_its_parts() -> None:
 
 
 WRONG: list[tuple[Any, type[Exception], str]] = [
-    (
-        lambda: sw.TransferFunction([1.0, 0.0, 0.0], [1.0, 1.0]),
-        ArgumentError,
-        "num: expected a degree of at most that of den, 1, got 2",
-    ),
+    (lambda: sw.TransferFunction([1.0, 0.0, 0.0], [1.0, 1.0]), ArgumentError,
+     "num: expected a degree of at most that of den, 1, got 2"),
     (lambda: sw.TransferFunction(1.0, 2.0), ArgumentError, "den: expected a degree of 1 or more, got 0: a gain alone"),
-    (
-        lambda: sw.TransferFunction(1.0, [0.0, 0.0]),
-        ArgumentError,
-        "den: expected a first coefficient other than zero, but all are",
-    ),
-    (
-        lambda: sw.TransferFunction(1.0, np.array([[0.0, 1.0], [1.0, 1.0]])),
-        ArgumentError,
-        "den: expected a first coefficient other than zero, but it is zero in 1 member and not in others",
-    ),
+    (lambda: sw.TransferFunction(1.0, [0.0, 0.0]), ArgumentError,
+     "den: expected a first coefficient other than zero, but all are"),
+    (lambda: sw.TransferFunction(1.0, np.array([[0.0, 1.0], [1.0, 1.0]])), ArgumentError,
+     "den: expected a first coefficient other than zero, but it is zero in 1 member and not in others"),
     (lambda: sw.TransferFunction([], [1.0, 1.0]), ShapeError, "num: expected the coefficients of a polynomial"),
     (lambda: sw.TransferFunction([1j], [1.0, 1.0]), DTypeError, "num: expected real numbers"),
     (lambda: sw.TransferFunction(np.ones((1, 2)), np.ones((2, 3))), ShapeError, "do not broadcast to one: num (2,), den (3,)"),
@@ -238,23 +229,17 @@ WRONG: list[tuple[Any, type[Exception], str]] = [
     (lambda: sw.LinearSystem.of(signal.ZerosPolesGain([], [-1.0 + 1j], 1.0)), ArgumentError, "poles: expected real numbers"),
     (lambda: sw.LinearSystem.of([1.0]), DTypeError, "system: expected a linear system of stepwell, or an object of SciPy"),
     (lambda: sw.LinearSystem.of(sw.Pendulum()), UnsupportedError, "system: expected a linear one"),
-    (
-        lambda: sw.LinearSystem.of(SimpleNamespace(A=np.zeros((0, 0)), B=np.zeros((0, 1)), C=np.zeros((1, 0)), D=[[2.0]], dt=0)),
-        ArgumentError,
-        "A: expected at least one state, got none: a gain alone",
-    ),
+    (lambda: sw.LinearSystem.of(SimpleNamespace(A=np.zeros((0, 0)), B=np.zeros((0, 1)), C=np.zeros((1, 0)), D=[[2.0]], dt=0)),
+     ArgumentError, "A: expected at least one state, got none: a gain alone"),
     (lambda: sw.feedback(sw.TransferFunction(*H), -0.5), ArgumentError, "an algebraic loop"),
     (lambda: sw.feedback(sw.TransferFunction(*H), 0.5, sign=1), ArgumentError, "an algebraic loop"),
     (lambda: sw.feedback(sw.TransferFunction(*H), sign=0), ArgumentError, "sign: expected -1 or 1, got 0"),
     (lambda: sw.series(1.0, 2.0), ArgumentError, "gains alone, which have no states"),
     (lambda: sw.parallel("G", 1.0), DTypeError, "first: expected a linear system of stepwell, or an object"),
     (lambda: sw.series(sw.LinearSystem([[1.0]]), 2.0), ArgumentError, "without inputs (B) and outputs (C)"),
-    (
-        lambda: sw.series(sw.TransferFunction(*G), sw.LinearSystem([[1.0]], [[1.0, 2.0]], [[1.0]])),
-        ShapeError,
-        "series: expected as many inputs of a system as the one before it has outputs, 1, got 2",
-    ),
-]
+    (lambda: sw.series(sw.TransferFunction(*G), sw.LinearSystem([[1.0]], [[1.0, 2.0]], [[1.0]])), ShapeError,
+     "series: expected as many inputs of a system as the one before it has outputs, 1, got 2"),
+]  # fmt: skip
 
 
 def test_what_is_refused() -> None:

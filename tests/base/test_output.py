@@ -195,7 +195,8 @@ class Falls(Table):
 
     def _columns(self) -> dict[str, list[Any]]:
         return stacked(
-            {"name": name, "t": np.arange(2.0), "y": np.array(y)} for name, y in (("a", [1, 0]), ("b", [0.1, math.nan]))
+            {"name": name, "t": np.arange(2.0), "y": np.array(y), "low": np.array(y) < 0.5}
+            for name, y in (("a", [1, 0]), ("b", [0.1, math.nan]))
         )
 
     def _head(self) -> dict[str, Any]:
@@ -205,7 +206,7 @@ class Falls(Table):
         return [{"lowest": -math.inf}]
 
 
-ROWS = [{"name": "a", "t": 0.0, "y": 1}, {"name": "a", "t": 1.0, "y": 0}, {"name": "b", "t": 0.0, "y": 0.1}]
+ROWS = [{"name": name, "t": t, "y": y, "low": y < 0.5} for name, t, y in (("a", 0.0, 1), ("a", 1.0, 0), ("b", 0.0, 0.1))]
 
 
 def test_rows_are_those_of_the_parts_one_below_the_other() -> None:
@@ -219,7 +220,10 @@ def test_csv_reads_back_as_the_rows(tmp_path: Path) -> None:
     Falls().to_csv(tmp_path / "t.csv")
     with (tmp_path / "t.csv").open(encoding="utf-8", newline="") as file:
         read = list(csv.DictReader(file))
-    assert [{"name": row["name"], "t": float(row["t"]), "y": float(row["y"])} for row in read[:3]] == ROWS
+    assert [list(row) for row in read] == [list(ROWS[0])] * 4
+    assert [[row["name"], float(row["t"]), float(row["y"]), row["low"] == "True"] for row in read[:3]] == [
+        [*row.values()] for row in ROWS
+    ]
 
 
 def test_json_has_head_summary_and_rows_and_null_for_what_is_not_finite(tmp_path: Path) -> None:
@@ -227,7 +231,7 @@ def test_json_has_head_summary_and_rows_and_null_for_what_is_not_finite(tmp_path
     read = json.loads((tmp_path / "t.json").read_text(encoding="utf-8"), parse_constant=pytest.fail)
     assert list(read) == ["dt", "summary", "rows"]
     assert read["summary"] == [{"lowest": None}]
-    assert read["rows"] == [*ROWS, {"name": "b", "t": 1.0, "y": None}]
+    assert read["rows"] == [*ROWS, {"name": "b", "t": 1.0, "y": None, "low": False}]
 
 
 def test_a_row_that_lacks_a_column_leaves_it_empty(tmp_path: Path) -> None:

@@ -109,11 +109,7 @@ MAKERS: dict[str, list[Callable[[], Any]]] = {
         {"steps": 40},
         {"steps": 30, "y": [1.0, 2.0]},
     ),
-    "Run": [
-        *each(run_of, {"steps": 30, "events": passage}, {}, {"every": 1}, {"force": 0.0}),
-        *each(paced, *FINER),
-        diverged,
-    ],
+    "Run": [*each(run_of, {"steps": 30, "events": passage}, {}, {"every": 1}, {"force": 0.0}), *each(paced, *FINER), diverged],
     "Device": each(partial(sw.Device, "opencl:0", "a GPU", "a driver", 1 << 30, 64), {}, {"float32": "it rounds otherwise"}),
     "Paces": each(lambda **ask: paced(**ask).paces, *FINER),
     "DiscreteSystem": [partial(sw.discretise, sw.Oscillator(), *each) for each in ((0.1,), (0.2,), (0.1, "rk4"))],

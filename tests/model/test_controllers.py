@@ -527,27 +527,15 @@ def run_around(function: Any) -> sw.Run:
 
 REST: dict[str, Any] = {"v": np.zeros(3), "y": np.zeros(3)}
 WRONG: list[tuple[Any, type[StepwellError], str]] = [
-    (
-        lambda: sw.controller(lambda t, x, total=0.0, *, gain=1.0: gain * x),
-        ArgumentError,
-        r"got \(t, x, total=0.0, \*, gain=1.0\): the state is called y here, got x",
-    ),
+    (lambda: sw.controller(lambda t, x, total=0.0, *, gain=1.0: gain * x), ArgumentError,
+     r"got \(t, x, total=0.0, \*, gain=1.0\): the state is called y here, got x"),
     (lambda: loop().surrounded(clock(period=0.2)), UnsupportedError, "part: the system has the controller .* sets u as well"),
-    (
-        lambda: two().surrounded(other(sets="w", period=1.0)),
-        UnsupportedError,
-        "first.* and other.* already, which sets w as well",
-    ),
-    (
-        lambda: mass().surrounded(sw.controller(lambda t, z: z[0])(period=0.1)),
-        UnsupportedError,
-        r"expected a linear system with outputs \(C\) for a controller of \(t, z",
-    ),
-    (
-        lambda: sw.TransferFunction([2.0, 1.0], [0.5, 1.0], x=0.0).surrounded(of_output(sets="x", period=0.1)),
-        UnsupportedError,
-        r"adds inputs to its outputs \(D\)",
-    ),
+    (lambda: two().surrounded(other(sets="w", period=1.0)), UnsupportedError,
+     "first.* and other.* already, which sets w as well"),
+    (lambda: mass().surrounded(sw.controller(lambda t, z: z[0])(period=0.1)), UnsupportedError,
+     r"expected a linear system with outputs \(C\) for a controller of \(t, z"),
+    (lambda: sw.TransferFunction([2.0, 1.0], [0.5, 1.0], x=0.0).surrounded(of_output(sets="x", period=0.1)), UnsupportedError,
+     r"adds inputs to its outputs \(D\)"),
     (
         lambda: (
             driven()
@@ -588,11 +576,8 @@ WRONG: list[tuple[Any, type[StepwellError], str]] = [
     (lambda: run_of(clocked(), method="verlet"), UnsupportedError, "verlet carries y_prev"),
     (lambda: run_of(loop(), method="exact"), UnsupportedError, "exact"),
     (lambda: run_of(loop(), form="matrix"), UnsupportedError, "form"),
-    (
-        lambda: run_of(loop(), method="dop853", dt=None, steps=None, every=None, tolerance=1e-6, at=[1.0]),
-        UnsupportedError,
-        "tolerance: does not go with a sampled controller: a controller samples at whole numbers of steps",
-    ),
+    (lambda: run_of(loop(), method="dop853", dt=None, steps=None, every=None, tolerance=1e-6, at=[1.0]), UnsupportedError,
+     "tolerance: does not go with a sampled controller: a controller samples at whole numbers of steps"),
     (lambda: run_of(loop(), events=lambda t, v, y: y - 0.5), UnsupportedError, "events: does not go with a sampled controller"),
     (lambda: sw.World(loop(), "rk4", **REST, dt=0.01, events=lambda t, v, y: y), UnsupportedError, "events: does not go with"),
     (lambda: run_around(lambda t, v, y, *, u=1.0: u * y), ArgumentError, "by other names than those of the system.*got u"),
@@ -606,7 +591,7 @@ WRONG: list[tuple[Any, type[StepwellError], str]] = [
     (lambda: run_around(lambda t, v, y: np.array([y, y])), TraceError, "expected u of one number"),
     (lambda: run_around(lambda t, v, y: 1.0 if y > 0.0 else 0.0), TraceError, "<lambda> .*if"),
     (lambda: run_around(lambda t, v, y: y + np.random.default_rng().uniform()), TraceError, "the same operations at every call"),
-]
+]  # fmt: skip
 
 #: What takes no system with such a controller.
 READING: list[Any] = [

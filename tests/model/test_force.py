@@ -207,17 +207,6 @@ def test_a_constant_force_moves_the_place_of_rest(method: str) -> None:
     assert np.abs(run.v[-1] - free.v[-1]).max() < 10 * 200 * 4 * 3 * 2.0**-53
 
 
-def test_it_is_the_acceleration_that_the_oscillator_takes_as_an_input() -> None:
-    """In physical form the input a is the same term, added in another place of the sum: rounding apart, over 300 steps."""
-    a = np.linspace(-1.0, 1.0, 5)
-    forced, driven, free = (
-        sw.integrate(sw.Oscillator(1.3, a=given, form="physical"), "rk4", v=0.1, y=1.0, dt=0.1, steps=300, force=force)
-        for given, force in ((None, a), (a, None), (None, None))
-    )
-    assert np.abs(forced.y - driven.y).max() < 300 * 40 * 4 * 2.0**-53
-    assert not np.array_equal(forced.y, free.y)
-
-
 def test_friction_resists_it() -> None:
     """A block at rest stays, to the bit, up to μN, and is moved by more: v = (force − μN)·t, a sum of 100 equal terms."""
     force = np.array([0.0, 0.5, -0.5, 0.5 + 1e-9, -0.75, 2.0])

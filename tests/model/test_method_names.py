@@ -125,10 +125,7 @@ def test_a_new_record_needs_nothing_else() -> None:
             "implicit, and not here; for stiff equations rosenbrock23, rodas4 and rodas5p choose their steps",
         ),
         ("euler_maruyama|Euler–Maruyama|Milstein|SRIW1|BAOAB", "for equations with noise, .* sw.Sampled"),
-        (
-            "Vern6|Verner 8|BS5|Cash-Karp|ode113",
-            "not here; dopri5, tsit5, vern7, dop853, vern9 and others choose",
-        ),
+        ("Vern6|Verner 8|BS5|Cash-Karp|ode113", "not here; dopri5, tsit5, vern7, dop853, vern9 and others choose"),
         ("Adams-Bashforth|AB2|ABM4|Gear's method|linear multistep method", "a method of several steps, and none of them is here"),
     ],
 )

@@ -103,14 +103,11 @@ STEPPED: list[tuple[Callable[[], tuple[Any, Any, Any, float]], list[sw.Method], 
     (lambda: (*bodies(3), 0.01), [heun_euler, adams_bashforth_3], {"fused": True}),
     (lambda: (*bodies(90), 0.001), [halfway, adams_bashforth_3], {}),
     (lambda: (sw.Chain(400), np.ones(400), np.linspace(0.0, 1.0, 400), 0.02), [heun_euler, adams_bashforth_2], {}),
-    (
-        lambda: (sw.LinearSystem(RNG.normal(size=(80, 80)) / 10.0), np.ones(40), np.ones(40), 0.02),
-        [halfway, adams_bashforth_2],
-        {},
-    ),
+    (lambda: (sw.LinearSystem(RNG.normal(size=(80, 80)) / 10.0), np.ones(40), np.ones(40), 0.02), [halfway, adams_bashforth_2],
+     {}),
     (lambda: (*points(3, restitution=0.6, friction=0.3), 0.02), [halfway, adams_bashforth_3], {}),
     (lambda: (*points(500, restitution=0.6), 0.03), ALL, {}),
-]
+]  # fmt: skip
 
 
 @looped("make, methods, options", STEPPED)
@@ -391,12 +388,8 @@ WRONG: list[tuple[Callable[[], Any], type[StepwellError], str]] = [
     (keeping(without_start, lambda s, t, h, v, y: s.dv(t, v, y)), ShapeError, "start: expected 2 blocks"),
     (keeping(without_start, lambda s, t, h, v, y: (y, v)), ShapeError, "expected two blocks of velocities or two of coordinates"),
     (keeping(swapped, one_before), ShapeError, "start returns velocities, coordinates"),
-    (
-        keeping(two_steps, lambda s, t, h, v, y: (0 * v, 0 * y)),
-        UnsupportedError,
-        "start: .* an error of h to the power",
-    ),
-]
+    (keeping(two_steps, lambda s, t, h, v, y: (0 * v, 0 * y)), UnsupportedError, "start: .* an error of h to the power"),
+]  # fmt: skip
 
 
 def test_what_a_method_cannot_be_is_said_in_words() -> None:

@@ -12,9 +12,6 @@ from support.calls import assert_raises
 from support.for_each import for_each
 
 METHODS = [m.name for m in sw.methods()]
-ADAPTIVE = [m.name for m in sw.methods() if m.error_order is not None and not m.has_series]
-ARENSTORF = {"v": np.array([0.0, -2.00158510637908252240537862224]), "y": np.array([0.994, 0.0])}
-PERIOD = 17.0652165601579625588917206249
 
 
 @for_each("method", METHODS)
@@ -68,13 +65,6 @@ def test_the_sine_of_numbers_that_only_the_analysis_knows():
     assert swing.rate_evaluations == plain.rate_evaluations == 4
     assert swing.multiplications - plain.multiplications == 4 * 14
     assert swing.additions - plain.additions == 4 * 12
-
-
-@for_each("method", ADAPTIVE)
-def test_chosen_steps_close_arenstorfs_orbit(method):
-    run = sw.integrate(sw.RestrictedThreeBody(), method, **ARENSTORF, tolerance=1e-13, at=[PERIOD])
-    np.testing.assert_allclose(run.y[-1], ARENSTORF["y"], rtol=0, atol=1e-6)
-    np.testing.assert_allclose(run.energy, sw.RestrictedThreeBody().energy(**ARENSTORF), rtol=1e-8)
 
 
 def test_the_triangle_stands_still():

@@ -259,19 +259,6 @@ def test_periodic_pulses_in_pieces(method: str) -> None:
         assert np.array_equal(sw.integrate(ticking(), method, at=at[cut:], resume=first).y, whole.y[cut:])
 
 
-def test_backward() -> None:
-    """From 3 s after the push back to before it: the same motion."""
-    end = solution(53.0, 50.0, 0.3)
-    run = sw.integrate(pulsed(), "dop853", y=end, t0=53.0, tolerance=1e-12, at=[50.3, 49.0])
-    # Errors grow by e⁴ on the way back, and a step at the edge errs by the tolerance of the 5.2 that y is there.
-    assert run.y == pytest.approx(solution(np.array([50.3, 49.0]), 50.0, 0.3), abs=54 * 50 * 5.2e-12)
-
-
-def test_solve_ivp_takes_the_same_steps() -> None:
-    by_scipys_name = sw.solve_ivp(lambda t, y: np.where(t > 50, 20.0, 0.0) - y, (0.0, 51.0), [1.0], rtol=1e-8, atol=1e-12)
-    assert by_scipys_name.y[0, -1] == pytest.approx(20.0 * -np.expm1(-1.0), rel=1e-6)
-
-
 def test_switches_are_looked_for_once_for_all_numbers(monkeypatch: pytest.MonkeyPatch) -> None:
     """What follows from the operations of a function holds for each of its systems; the times are those of its own numbers."""
     built: list[int] = []

@@ -187,17 +187,6 @@ def test_a_wrong_order_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
     assert _cleaned_slopes(lambda steps: _forced(steps, "numpy")) != pytest.approx([8.0, 8.0], abs=0.1)
 
 
-def test_growth_above_the_limit() -> None:
-    """By the radius |Σ (iΦ)ᵏ/k!| in each step, to the letter: the matrix turns and stretches, so lengths are its powers."""
-    # A thousandth above the limit that is 11.02 after 4000 steps: growth begins slowly there. Each step has some 50 roundings.
-    phi = TAYLOR.limit * np.array([0.999, 1.0 - 1e-9, 1.0 + 1e-9, 1.001])
-    radius = abs(sum((1j * phi) ** k / math.factorial(k) for k in range(9)))
-    assert np.array_equal(radius > 1.0, [False, False, True, True])
-    assert radius[3] ** 4000 == pytest.approx(11.02, rel=1e-3)
-    run = sw.integrate(sw.Oscillator(phi), "taylor", v=0.0, y=1.0, dt=1.0, steps=4000)
-    np.testing.assert_allclose(np.hypot(run.v[-1], run.y[-1]), radius**4000, rtol=4000 * 50 * EPS * 10)
-
-
 @looped("tolerance", [1e-3, 1e-6, 1e-9, 1e-12, 1e-15])
 def test_order_and_step_by_the_tolerance(tolerance: float) -> None:
     """Of ẏ = y the coefficients are y/k!, so the step is known.
@@ -273,17 +262,6 @@ def test_evaluations_counted_by_the_reference(system: sw.System) -> None:
     evaluations = -(-every // rates)
     assert engine.evaluations(TAYLOR, system) == evaluations
     assert sw.stability.operations(TAYLOR, system).rate_evaluations == evaluations
-
-
-def test_saved_states_are_on_the_series() -> None:
-    """At any times: as near to the true circle as the tolerance says, and steps do not depend on them."""
-    ask: dict[str, Any] = {"v": 0.0, "y": 1.0, "tolerance": 1e-12}
-    times = np.sort(np.random.default_rng(1).uniform(0.0, 20.0, 200))
-    many, last = (sw.integrate(sw.Oscillator(), "taylor", at=at, **ask) for at in (times, times[-1:]))
-    assert many.paces.accepted == last.paces.accepted
-    assert np.array_equal(many.y[-1], last.y[-1])
-    # A step errs by less than the tolerance of the lengths of v and y, which are 1; twenty units of time have so many steps.
-    assert np.abs(many.y - np.cos(times)).max() < (many.paces.accepted + 1) * 2e-12
 
 
 def test_energy_at_rounding_level() -> None:

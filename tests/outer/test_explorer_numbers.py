@@ -136,22 +136,16 @@ def test_energies_are_those_of_the_systems(tmp_path: Path) -> None:
 #: Scenes that are no built-in ones, sliders of their steps' parameters, and the same system with these.
 SLID: list[tuple[sw.Scene, dict[str, float], sw.System]] = [
     (sw.scenes.kepler(e=0.5), {"Gm_0": 0.75, "softening": 0.5}, sw.NBody([0.75, 0.5], force="newton", softening=0.5)),
-    (
-        sw.Scene(sw.NBody([1.0, 2.0], force="newton", G=4.0), v=0.0, y=[[0.0, 1.0], [1.0, 0.0]], horizon=1.0),
-        {"Gm_1": 12.0},
-        sw.NBody([1.0, 3.0], force="newton", G=4.0),
-    ),
+    (sw.Scene(sw.NBody([1.0, 2.0], force="newton", G=4.0), v=0.0, y=[[0.0, 1.0], [1.0, 0.0]], horizon=1.0), {"Gm_1": 12.0},
+     sw.NBody([1.0, 3.0], force="newton", G=4.0)),
     (
         sw.scenes.triple_pendulum(),
         {"masses_2": 2.0, "gravity": 0.5},
         sw.Rods([1.0, 1.0, 2.0], sw.scenes.triple_pendulum().system.rods, 1.0, gravity=0.5),  # type: ignore[attr-defined]
     ),
     (sw.Scene(sw.Oscillator(2.0), v=0.0, y=1.0, horizon=9.0), {"omega": 3.0}, sw.Oscillator(3.0)),
-    (
-        sw.Scene(sw.Oscillator(2.0, 0.1, form="physical"), v=0.0, y=1.0, horizon=9.0),
-        {"omega": 3.0, "damping": 0.2},
-        sw.Oscillator(3.0, 0.2, form="physical"),
-    ),
+    (sw.Scene(sw.Oscillator(2.0, 0.1, form="physical"), v=0.0, y=1.0, horizon=9.0), {"omega": 3.0, "damping": 0.2},
+     sw.Oscillator(3.0, 0.2, form="physical")),
     (
         sw.Scene(
             sw.Springs([(0, 1), (1, 2)], stiffness=9.0, rest=1.0, masses=2.0, fixed=[0], gravity=(0.0, -9.81)),
@@ -162,13 +156,10 @@ SLID: list[tuple[sw.Scene, dict[str, float], sw.System]] = [
         {"stiffness": 4.0, "masses": 3.0, "gravity_1": -2.0},
         sw.Springs([(0, 1), (1, 2)], stiffness=4.0, rest=1.0, masses=3.0, fixed=[0], gravity=(0.0, -2.0)),
     ),
-    (
-        sw.Scene(sw.Chain(8), v=0.0, y=np.arange(8.0), horizon=9.0),
-        {"stiffness": 2.0, "mass": 0.5},
-        sw.Chain(8, stiffness=2.0, mass=0.5),
-    ),
+    (sw.Scene(sw.Chain(8), v=0.0, y=np.arange(8.0), horizon=9.0), {"stiffness": 2.0, "mass": 0.5},
+     sw.Chain(8, stiffness=2.0, mass=0.5)),
     (sw.scenes.symmetric_top(), {"inertia_0": 1.5}, None),
-]
+]  # fmt: skip
 
 
 @pytest.mark.parametrize("forgotten", [pytest.param(False, id="as they are"), pytest.param(True, id="a mistake")])
@@ -225,16 +216,13 @@ told = given.map(([name, values, times]) => {
 FORMULAS: list[tuple[str, dict[str, float], Any]] = [
     ("oscillator", {"omega": 2.0}, lambda: sw.scenes.scene("oscillator:omega=2.0")),
     ("forced_oscillator", {}, lambda: scene_of("forced_oscillator")),
-    (
-        "forced_oscillator",
-        {"omega": 2.0, "damping": 0.4, "amplitude": 0.5, "drive": 1.1},
-        lambda: sw.scenes.scene("forced_oscillator:omega=2.0,damping=0.4,amplitude=0.5,drive=1.1"),
-    ),
+    ("forced_oscillator", {"omega": 2.0, "damping": 0.4, "amplitude": 0.5, "drive": 1.1},
+     lambda: sw.scenes.scene("forced_oscillator:omega=2.0,damping=0.4,amplitude=0.5,drive=1.1")),
     ("bouncing_ball", {}, lambda: scene_of("bouncing_ball")),
     ("sliding_block", {"friction": 2.0, "start": 4.0}, lambda: sw.scenes.scene("sliding_block:friction=2.0,speed=4.0")),
     ("sticking_block", {}, lambda: scene_of("sticking_block")),
     ("sticking_block", {"friction": 0.31}, lambda: sw.scenes.scene("sticking_block:friction=0.31")),
-]
+]  # fmt: skip
 
 
 def truths(folder: Path, change: Any = None) -> dict[str, float]:

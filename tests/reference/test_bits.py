@@ -78,8 +78,7 @@ def test_diverging_members_too(case: Case) -> None:
 
 
 @pytest.mark.parametrize(
-    ("dtype", "scales"),
-    [("float64", (5e-324, 1e-308, 1e-160, 1e160, 1e300)), ("float32", (1e-45, 1e-38, 1e-30, 1e30, 3e37))],
+    ("dtype", "scales"), [("float64", (5e-324, 1e-308, 1e-160, 1e160, 1e300)), ("float32", (1e-45, 1e-38, 1e-30, 1e30, 3e37))]
 )
 def test_extremes_of_size(dtype: str, scales: tuple[float, ...]) -> None:
     """Denormal numbers and huge ones: no level flushes to zero."""

@@ -39,7 +39,7 @@ def scaled(system: sw.System, v: Any, y: Any) -> Any:
 def test_every_method_on_every_system(name: str) -> None:
     system, v, y = made(name)
     large = v.size + y.size > 150 * MEMBERS
-    for method in METHODS[:3] if large else drawn(METHODS, None if families.LONG else 8, "step", name):
+    for method in METHODS[:3] if large else drawn(METHODS, None if families.LONG else 4, "step", name):
         if fits(system, method):
             tape = Tape()
             symbols = Tracer(system, tape).step(method)

@@ -483,7 +483,7 @@ def test_kept_steps_with_events() -> None:
 
 # Where steps were wrong without a word: pulses, jumps, small components, units, states that must stay positive.
 PAIRS = ["merson", "fehlberg", "fehlberg_5", "dop853"]
-ONES, NOTHING = np.ones(3), sw.Sampled([0.0], interval=1.0)
+ONES = np.ones(3)
 
 
 @sw.system(order=1)
@@ -503,18 +503,6 @@ def opened(t: Any, begin: Any, end: Any) -> Any:
 def may_leonard(t: Any, n: Any, *, a: float = 0.8, b: float = 1.3) -> Any:
     """Three species, each of which suppresses the next."""
     return n * (1 - n - a * np.roll(n, -1) - b * np.roll(n, -2))
-
-
-def test_a_pulse_from_rest_is_seen() -> None:
-    """At rest a step is no longer than a 32nd of the time since the start, so a pulse that lasts for longer is met by stages.
-
-    The error at the end is that of some tens of steps at the jumps, each of which may err by the tolerance of n: 1e-7 is ample.
-    """
-    for method in PAIRS:
-        run = sw.integrate(gated(), method, y=0.0, tolerance=1e-9, at=[6.0, 10.0])
-        assert run.y == pytest.approx([0.43233236, 0.00791844], abs=1e-7), method
-        late = sw.integrate(gated(begin=7.3, end=7.6), method, y=0.0, tolerance=1e-9, at=[7.5, 10.0])
-        assert late.y == pytest.approx(opened(late.t, 7.3, 7.6), abs=1e-7), method
 
 
 def test_random_pulses() -> None:
@@ -772,21 +760,6 @@ def test_equal_bits_with_everything() -> None:
     }
     for method in ("merson", "dop853"):
         assert_equal_ways(may_leonard(), method, ways=("by the reference", "at each level"), **ask)
-
-
-def test_inputs_know_their_jumps() -> None:
-    """Held samples are met at their times: as good as a closed form, and no step is rejected for them."""
-    values = np.array([0.0, 1.0, -2.0, 0.5, 0.5, 3.0])
-
-    follows = sw.system(order=1)(lambda t, y, *, u=NOTHING: u - y)
-    y, at = 0.0, np.arange(1.0, 7.0)
-    right = []
-    for value in values:  # over each second, y goes to the value by 1 − 1/e
-        y = value + (y - value) * np.exp(-1.0)
-        right.append(y)
-    for method in PAIRS:
-        run = sw.integrate(follows(u=sw.Sampled(values, interval=1.0)), method, y=0.0, tolerance=1e-10, at=at)
-        assert run.y == pytest.approx(right, abs=1e-8), method
 
 
 def test_scenes_sweeps_and_solve_ivp() -> None:

@@ -66,21 +66,17 @@ SWAPPED: list[tuple[Any, str]] = [
     (lambda: sw.system(order=1)(lambda x, t: -x), "f(t, y), got (x, t): t stands at the place of y"),
     (lambda: sw.system(order=1)(lambda v, y: -y), "f(t, y), got (v, y): v stands at the place of t"),
     (lambda: run(events=sw.Event(lambda t, y, v: y, name="e")), "events: e: expected a function f(t, v, y), got (t, y, v)"),
-    (
-        lambda: run(events=sw.Event(lambda t, v, y: y, then=lambda t, y, v: (v, y), name="e")),
-        "events: e: then: expected a function f(t, v, y), got (t, y, v)",
-    ),
+    (lambda: run(events=sw.Event(lambda t, v, y: y, then=lambda t, y, v: (v, y), name="e")),
+     "events: e: then: expected a function f(t, v, y), got (t, y, v)"),
     (lambda: second.invariant(lambda y, v: v * v + y * y), "f(v, y), got (y, v): y stands at the place of v"),
     (lambda: second.invariant(lambda v, y, t: v * v + y * y), "f(t, v, y), got (v, y, t)"),
     (lambda: first.invariant(lambda y, t: y * y), "f(t, y), got (y, t)"),
     (lambda: second(k=lambda v: abs(v)), "k: expected a function f(t), got (v): v stands at the place of t"),
     (lambda: sw.sweeps.Crossing(lambda v, y, t: y), "of: expected a function f(t, v, y), got (v, y, t)"),
     (lambda: sw.solve_ivp(lambda y, t: -y, (0.0, 1.0), [1.0]), "fun: <lambda>: expected a function f(t, y), got (y, t)"),
-    (
-        lambda: sw.solve_ivp(lambda t, y: -y, (0.0, 1.0), [1.0], events=lambda y, t: y[0]),
-        "events: <lambda>: expected a function f(t, y), got (y, t)",
-    ),
-]
+    (lambda: sw.solve_ivp(lambda t, y: -y, (0.0, 1.0), [1.0], events=lambda y, t: y[0]),
+     "events: <lambda>: expected a function f(t, y), got (y, t)"),
+]  # fmt: skip
 
 #: Calls, and what their errors say, by the kind of error.
 BAD: dict[type[Exception], list[tuple[Callable[[], Any], str]]] = {
@@ -143,10 +139,8 @@ BAD: dict[type[Exception], list[tuple[Callable[[], Any], str]]] = {
         (lambda: sw.Oscillator(0.0), "omega: expected numbers above zero in rad per unit of time, got 0"),
         (lambda: sw.Oscillator([1.0, -2.0]), "omega: expected numbers above zero in rad per unit of time, got -2 at index (1,)"),
         (lambda: sw.Sampled([1.0], 0.0), "interval: expected numbers above zero in units of time, got 0"),
-        (
-            lambda: run(sw.Oscillator(a=sw.Sinusoid(1.0, 1e9)), t0=1e9),
-            "omega, phase: a sinusoid's angle may grow to 1.13e+15 rad, but reaches 1e+18 rad by t = 1e+09",
-        ),
+        (lambda: run(sw.Oscillator(a=sw.Sinusoid(1.0, 1e9)), t0=1e9),
+         "omega, phase: a sinusoid's angle may grow to 1.13e+15 rad, but reaches 1e+18 rad by t = 1e+09"),
         (lambda: sw.Chain(0), "n: expected 1 or more, got 0"),
         (lambda: sw.Chain(2, mass=[1.0, 0.0]), "mass: expected numbers above zero, got 0"),
         (lambda: sw.Chain(2, stiffness=-1.0), "stiffness: expected numbers of zero or more, got -1"),
@@ -166,43 +160,29 @@ BAD: dict[type[Exception], list[tuple[Callable[[], Any], str]]] = {
         (lambda: world().step(-1), "n: expected 0 or more, got -1"),
     ],
     errors.UnsupportedError: [
-        (
-            lambda: run(resume=run(y=[1.0, 2.0], steps=50, events=sw.Event(_height, terminal=True))),
-            "resume: 2 of 2 members stopped at an event, at times of their own; begin a new run for each member i: "
-            "v=run.v[-1][..., i], y=run.y[-1][..., i], t0=float(run.stopped_at[i])",
-        ),
-        (
-            lambda: run(resume=run(steps=50, events=sw.Event(_height, terminal=True))),
-            "resume: the run stopped at an event, at a time of its own; begin a new run from there: "
-            "v=run.v[-1], y=run.y[-1], t0=float(run.stopped_at)",
-        ),
-        (
-            lambda: run(sw.Oscillator(damping=0.1), "verlet"),
-            "verlet needs forces that do not depend on the velocity, but Oscillator(omega=1.0, damping=0.1, form='canonical') "
-            "has damping; use false_euler, or leave damping out",
-        ),
+        (lambda: run(resume=run(y=[1.0, 2.0], steps=50, events=sw.Event(_height, terminal=True))),
+         "resume: 2 of 2 members stopped at an event, at times of their own; begin a new run for each member i: "
+         "v=run.v[-1][..., i], y=run.y[-1][..., i], t0=float(run.stopped_at[i])"),
+        (lambda: run(resume=run(steps=50, events=sw.Event(_height, terminal=True))),
+         "resume: the run stopped at an event, at a time of its own; begin a new run from there: "
+         "v=run.v[-1], y=run.y[-1], t0=float(run.stopped_at)"),
+        (lambda: run(sw.Oscillator(damping=0.1), "verlet"),
+         "verlet needs forces that do not depend on the velocity, but Oscillator(omega=1.0, damping=0.1, form='canonical') "
+         "has damping; use false_euler, or leave damping out"),
         (lambda: world(sw.Oscillator(damping=0.1), "verlet"), "verlet needs forces that do not depend on"),
         (lambda: run(sw.NBody(), y=np.ones((3, 2)), form="matrix"), "only linear systems have a transition matrix"),
         (lambda: run(control=sw.EnergyControl(0.3)), "control: Oscillator(omega=1.0, form='canonical') has no energy control"),
-        (
-            lambda: run(sw.NBody(), "leapfrog", y=np.eye(3, 2), control=sw.Projection()),
-            "control: leapfrog carries v_half in place of v, so it cannot be combined with Projection",
-        ),
-        (
-            lambda: run(linear([0.0, 1.0]), "verlet"),
-            "verlet needs a second-order system, ÿ = a(t, y); LinearSystem(2 states, 1 of them velocities, 1 input, 0 outputs)",
-        ),
-        (
-            lambda: run(sw.LinearSystem([[-1.0, -1.0], [1.0, 0.0]]), "verlet"),
-            "use rk4, or implicit_midpoint, which keeps what turns, or leave velocities in the rows of v out",
-        ),
+        (lambda: run(sw.NBody(), "leapfrog", y=np.eye(3, 2), control=sw.Projection()),
+         "control: leapfrog carries v_half in place of v, so it cannot be combined with Projection"),
+        (lambda: run(linear([0.0, 1.0]), "verlet"),
+         "verlet needs a second-order system, ÿ = a(t, y); LinearSystem(2 states, 1 of them velocities, 1 input, 0 outputs)"),
+        (lambda: run(sw.LinearSystem([[-1.0, -1.0], [1.0, 0.0]]), "verlet"),
+         "use rk4, or implicit_midpoint, which keeps what turns, or leave velocities in the rows of v out"),
         (lambda: sw.export(sw.Chain(10**7), "rk4", "c"), "at most 3000000 are written; export a smaller system"),
     ],
     errors.DTypeError: [
-        (
-            lambda: world(v=np.zeros(()), y=np.float64(1.0)),
-            "y: expected a NumPy array to step in place, got float64; one number is np.array(1.0)",
-        ),
+        (lambda: world(v=np.zeros(()), y=np.float64(1.0)),
+         "y: expected a NumPy array to step in place, got float64; one number is np.array(1.0)"),
         (lambda: sw.stability_limit("rk4", sw.Oscillator()), "method: expected the name of a method, got Oscillator"),  # type: ignore[arg-type]
         (lambda: sw.sweep(sw.Oscillator, "rk4", {"omega": ("w", [1.0])}), "axes stand before the method"),  # type: ignore[arg-type]
         (lambda: sw.sweep({"omega": ("w", [1.0])}, sw.Oscillator, "rk4"), "axes stand behind the system"),  # type: ignore[arg-type]
@@ -217,10 +197,8 @@ BAD: dict[type[Exception], list[tuple[Callable[[], Any], str]]] = {
         (lambda: sw.NBody([1.0], mass=2.0), "NBody: got an unexpected keyword argument 'mass'; expected NBody(masses="),  # type: ignore[call-arg]
         (lambda: run(system="oscillator"), "system: expected a stepwell system such as Oscillator(), got str"),
         (lambda: run(resume=1.0), "resume: expected a Run or a World that goes on, got 1.0"),
-        (
-            lambda: run(control=0.3),
-            "control: expected an EnergyControl, a LengthControl, a NormControl, a Control or a Projection, got float",
-        ),
+        (lambda: run(control=0.3),
+         "control: expected an EnergyControl, a LengthControl, a NormControl, a Control or a Projection, got float"),
         (lambda: run(dt="fast"), "dt: expected real numbers in units of time, got 'fast'"),
         (lambda: run(steps=2.5), "steps: expected a whole number, got 2.5 (float)"),
         (lambda: run(steps=True), "steps: expected a whole number, got True (bool)"),
@@ -238,10 +216,8 @@ BAD: dict[type[Exception], list[tuple[Callable[[], Any], str]]] = {
         (lambda: run(y=np.array([1.0, None])), "y: expected real numbers, got an array of dtype object"),
         (lambda: sw.scenes.scene(3), "scene: expected a Scene or its name, got int"),
         (lambda: sw.advise("clover", methods=4), "methods: expected a list of names, got 4 (int)"),
-        (
-            lambda: sw.charts.work_precision("clover", peers=["x"]),
-            "peers: expected a Peer, such as peers.scipy(), or a function, got 'x'",
-        ),
+        (lambda: sw.charts.work_precision("clover", peers=["x"]),
+         "peers: expected a Peer, such as peers.scipy(), or a function, got 'x'"),
         (lambda: sw.charts.work_precision("clover", progress=True), "progress: expected a function or None, got True (bool)"),
         (lambda: world(v=[0.0] * 3), "v: expected a NumPy array to step in place, got list"),
         (lambda: world(v=np.zeros(3, np.float32)), "v: expected dtype float64 to step in place, got float32"),
@@ -249,14 +225,10 @@ BAD: dict[type[Exception], list[tuple[Callable[[], Any], str]]] = {
     ],
     errors.ShapeError: [
         (lambda: sw.NBody(masses=1.0), "masses: expected one for each body along the first axis, got shape ()"),
-        (
-            lambda: sw.integrate(sw.NBody(), "rk4", v=np.zeros((3, 2)), y=np.ones((3, 3)), dt=0.1, steps=1),
-            "v and y: expected as many dimensions in both, got shapes (3, 2) and (3, 3)",
-        ),
-        (
-            lambda: sw.integrate(sw.NBody(dim=3), "rk4", v=0.0, y=np.ones((3, 2)), dt=0.1, steps=1),
-            "y: expected shape (3, 3, batch…) = (bodies, dim, batch…), got (3, 2); batch axes come last",
-        ),
+        (lambda: sw.integrate(sw.NBody(), "rk4", v=np.zeros((3, 2)), y=np.ones((3, 3)), dt=0.1, steps=1),
+         "v and y: expected as many dimensions in both, got shapes (3, 2) and (3, 3)"),
+        (lambda: sw.integrate(sw.NBody(dim=3), "rk4", v=0.0, y=np.ones((3, 2)), dt=0.1, steps=1),
+         "y: expected shape (3, 3, batch…) = (bodies, dim, batch…), got (3, 2); batch axes come last"),
         (lambda: run(dt=[0.1, 0.2]), "dt: expected one number in units of time, got an array of shape (2,)"),
         (lambda: run(y=[[1.0], [1.0, 2.0]]), "y: expected a number or a regular array, got list"),
         (lambda: sw.Sampled([], 1.0), "values: expected at least one sample along the first axis, got shape (0,)"),
@@ -272,20 +244,14 @@ BAD: dict[type[Exception], list[tuple[Callable[[], Any], str]]] = {
         (lambda: sw.LinearSystem(np.ones((2, 2, 2)), [1.0, 2.0]), "B: expected shape (n = 2, m, batch…), got (2,)"),
         (lambda: linear(C=np.ones((1, 3))), "C: expected shape (r, n = 2, batch…), got (1, 3)"),
         (lambda: linear(C=np.ones((0, 2))), "C: expected shape (r, n = 2, batch…), got (0, 2)"),
-        (
-            lambda: linear(np.ones((2, 3)), np.ones((4, 2)), np.ones((3, 4))),
-            "D: expected shape (r = 4, m = 3, batch…), got (3, 4)",
-        ),
+        (lambda: linear(np.ones((2, 3)), np.ones((4, 2)), np.ones((3, 4))),
+         "D: expected shape (r = 4, m = 3, batch…), got (3, 4)"),
         (lambda: linear(np.eye(2), x=1.0), "x: expected a sequence of 2 inputs, one for each column of B, got one float"),
-        (
-            lambda: linear(np.eye(2), x=sw.Sinusoid(1.0, 1.0)),
-            "x: expected a sequence of 2 inputs, one for each column of B, got one Sinusoid",
-        ),
+        (lambda: linear(np.eye(2), x=sw.Sinusoid(1.0, 1.0)),
+         "x: expected a sequence of 2 inputs, one for each column of B, got one Sinusoid"),
         (lambda: linear(np.eye(2), x=[1.0, 2.0, 3.0]), "x: expected a sequence of 2 inputs, one for each column of B, got 3"),
-        (
-            lambda: sw.LinearSystem(np.ones((2, 2, 3)), np.ones((2, 1, 4)), x=np.ones(5)),
-            "these batch shapes do not broadcast to one: A (3,), B (4,), x (5,)",
-        ),
+        (lambda: sw.LinearSystem(np.ones((2, 2, 3)), np.ones((2, 1, 4)), x=np.ones(5)),
+         "these batch shapes do not broadcast to one: A (3,), B (4,), x (5,)"),
         (lambda: run(linear(velocities=2), v=np.ones(3)), "v: expected shape (2, batch…) = (states, batch…), got (3,)"),
         (lambda: linear().split(np.ones(3)), "state: expected shape (2, batch…) = (states, batch…), got (3,)"),
         (lambda: linear().state(np.ones(2), 1.0), "v: expected shape (1, batch…) = (states, batch…), got (2,)"),
@@ -294,10 +260,8 @@ BAD: dict[type[Exception], list[tuple[Callable[[], Any], str]]] = {
         (lambda: sw.Oscillator(np.ones(3), np.ones(4)), "do not broadcast to one: omega (3,), damping (4,)"),
         (lambda: run(y=np.zeros(0)), "y: expected at least one member, got an empty batch of shape (0,)"),
         (lambda: sw.Oscillator(np.zeros(0)), "omega: expected at least one member, got an empty batch of shape (0,)"),
-        (
-            lambda: run(sw.NBody(), y=np.zeros((2, 3))),
-            "y: expected shape (3, 2 or 3, batch…) = (bodies, dim, batch…), got (2, 3); batch axes come last",
-        ),
+        (lambda: run(sw.NBody(), y=np.zeros((2, 3))),
+         "y: expected shape (3, 2 or 3, batch…) = (bodies, dim, batch…), got (2, 3); batch axes come last"),
         (lambda: run(sw.Chain(4), y=np.zeros(3)), "y: expected shape (4, batch…) = (masses, batch…), got (3,)"),
         (lambda: run(y=np.ones((1,) * 30)), "y: expected at most 24 batch axes, got 30"),
         (lambda: run(sw.NBody(), y=[[1.0], [1.0, 2.0]]), "y: expected a number or a regular array, got list"),
@@ -319,10 +283,8 @@ BAD: dict[type[Exception], list[tuple[Callable[[], Any], str]]] = {
         (lambda: world(v=np.full(3, np.nan)), "v: expected finite numbers, got nan at index (0,)"),
     ],
     errors.TooLargeError: [
-        (
-            lambda: run(sw.Oscillator(np.ones((10**6, 1)), np.ones(10**6))),
-            "the saved states of 1000000000000 members need 1.04e+05 GiB, but ",
-        ),
+        (lambda: run(sw.Oscillator(np.ones((10**6, 1)), np.ones(10**6))),
+         "the saved states of 1000000000000 members need 1.04e+05 GiB, but "),
         (lambda: run(y=MANY), "y: expected an array that fits in memory, got shape (100000000000,): 745 GiB as floats"),
         (lambda: run(y=range(10**11)), "y: expected an array that fits in memory, got shape (100000000000,)"),
         (lambda: run(v=[MANY, MANY]), "v: expected an array that fits in memory, got shape (2, 100000000000)"),
@@ -339,13 +301,11 @@ BAD: dict[type[Exception], list[tuple[Callable[[], Any], str]]] = {
         ),
         (lambda: sw.sweeps.random("s", 10**11, seed=1, omega=(0.0, 1.0)), "count: the samples of 100000000000 members"),
         (lambda: sw.sweeps.sobol("s", 2**37, seed=1, omega=(0.0, 1.0)), "count: the samples of 137438953472 members"),
-        (
-            lambda: run(y=np.ones(1000), steps=10**12, every=1),
-            " are available (memory of this machine); keep less with every= or split the batch",
-        ),
+        (lambda: run(y=np.ones(1000), steps=10**12, every=1),
+         " are available (memory of this machine); keep less with every= or split the batch"),
         (lambda: sw.Chain(10**14), "n: stiffnesses and masses need 1.49e+06 GiB"),
     ],
-}
+}  # fmt: skip
 
 
 def said(call: Callable[[], Any], error: type[Exception]) -> str:

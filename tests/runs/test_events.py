@@ -20,7 +20,7 @@ from stepwell.runs.events.members import Members
 from stepwell.runs.events.traced import Quantity
 from stepwell.runs.events.trials import AdaptiveTrials, Trials, one_step
 from support.cases import SYSTEMS, Case, assert_same, cases, number, representative
-from support.events import ABLE, FEW, GRAVITY, U, assert_same_events, crossing, passing
+from support.events import ABLE, FEW, GRAVITY, U, assert_same_events, crossing, passing, without_core  # noqa: F401
 from support.families import family
 from support.refusals import refused
 from support.ways import assert_equal_ways, assert_same_run
@@ -571,16 +571,6 @@ def test_a_member_of_a_world_that_diverged_has_none() -> None:
     assert world.events[name].count[1] > 0
 
 
-def test_copies_of_a_world_have_the_same_events() -> None:
-    world = sw.World(sw.Pendulum(), "verlet", **start(), dt=0.1, events=TWO)
-    world.step(7)
-    others = [copy.copy(world), copy.deepcopy(world)]
-    world.step(40)
-    for other in others:
-        other.step(40)
-        assert other.events == world.events
-
-
 def test_progress_is_told_up_to_the_end() -> None:
     start, of_each = (np.array(0.0), np.array(1.0)), {"fixed": [], "adaptive": []}
     plan = engine.Plan(sw.Oscillator(), sw.method("rk4"), (), 0.1, steps=1000, progress=of_each["fixed"].append)
@@ -643,6 +633,7 @@ def test_wrong_events_of_worlds() -> None:
 
 
 @pytest.mark.mutant
+@pytest.mark.usefixtures("without_core")
 def test_mistake_the_quantity_of_the_last_call_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
     right, quantities = Frames._quantities, {}
 
@@ -679,6 +670,7 @@ def test_mistake_the_length_of_another_step_is_noticed(method: str, monkeypatch:
 
 
 @pytest.mark.mutant
+@pytest.mark.usefixtures("without_core")
 def test_mistake_what_comes_after_the_end_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
     class Wrong(adaptive._Driver):
         def __init__(self, *arguments: Any) -> None:
@@ -698,6 +690,7 @@ def test_mistake_what_comes_after_the_end_is_noticed(monkeypatch: pytest.MonkeyP
 
 
 @pytest.mark.mutant
+@pytest.mark.usefixtures("without_core")
 def test_mistake_what_came_before_the_piece_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
     look = adaptive._Driver._look
     monkeypatch.setattr(adaptive._Driver, "_look", lambda self, *arguments: look(self, *arguments[:-1], False))
@@ -706,6 +699,7 @@ def test_mistake_what_came_before_the_piece_is_noticed(monkeypatch: pytest.Monke
 
 
 @pytest.mark.mutant
+@pytest.mark.usefixtures("without_core")
 def test_mistake_attempts_after_the_end_or_one_too_few_are_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
     right = adaptive._Driver.stepped
 
@@ -860,15 +854,6 @@ def test_backward_between_two_walls_over_jumps() -> None:
     np.testing.assert_allclose(both, -(0.5 + np.arange(21)) / 7.0, rtol=0, atol=200 * U * 3.0)
 
 
-def test_a_system_without_velocities_is_set_back() -> None:
-    """A neuron that integrates and fires: ẏ = 1 from 0 to 1 and back to 0 fires at the whole numbers."""
-    charge = sw.system(order=1)(lambda t, y: 1.0 + 0.0 * y)
-    fires = sw.Event(lambda t, y: y - 1.0, direction=1, then=lambda t, y: 0.0 * y, name="fires")
-    run = sw.integrate(charge(), "rk4", y=0.0, dt=0.3, steps=35, events=fires)
-    np.testing.assert_allclose(run.events["fires"].t, np.arange(1, 11), rtol=0, atol=35 * 10 * U)
-    np.testing.assert_allclose(run.y[-1], 0.5, rtol=0, atol=35 * 10 * U)
-
-
 @pytest.mark.parametrize("method", ABLE)
 def test_a_neuron_fires_when_a_closed_form_says(method: str) -> None:
     """ẏ = I − y from 0 to 1 takes ln(I/(I − 1)), and begins at 0 again; what it fired for is added up beside it. Bound: a step
@@ -947,53 +932,24 @@ def frames_are_those_of_a_run(method: str, n: int) -> None:
 @pytest.mark.parametrize(
     ("method", "steps"), [("rk4", {"dt": 0.01, "steps": 100}), ("dop853", {"tolerance": 1e-9, "at": [0.5, 1.0]})]
 )
-def test_a_ball_that_begins_at_the_ground_lies_there_or_leaves_it(method: str, steps: dict[str, Any]) -> None:
-    """At rest it stays; upwards it flies for 2v/g and bounces. Bound: the roundings of some 100 steps."""
-    with pytest.warns(sw.EventWarning, match="came to rest at event ground, at t = 0"):
-        lies = sw.integrate(ball(), method, v=0.0, y=0.0, events=ground(0.8), **steps)
-    assert (lies.y == 0.0).all()
-    assert lies.stopped_at == 0.0
-    assert lies.events["ground"].count == 0
+def test_a_ball_that_is_thrown_from_the_ground_leaves_it(method: str, steps: dict[str, Any]) -> None:
+    """It flies for 2v/g and bounces. Bound: the roundings of some 100 steps. At rest it stays: ``test_events_followed.py``."""
     flies = sw.integrate(ball(), method, v=3.0, y=0.0, events=ground(0.8), **steps)
     np.testing.assert_allclose(flies.events["ground"].t[0], 2.0 * 3.0 / GRAVITY, rtol=0, atol=62 * U)
 
 
-@pytest.mark.parametrize("method", ["rk4", "leapfrog"])  # one carries v at another time
-def test_none_of_many_balls_of_a_world_ends_below_the_ground(method: str) -> None:
-    """After ten seconds of frames all lie at the ground, and stay there, to the roundings of a height."""
-    v, y = np.zeros(15), np.linspace(0.5, 3.0, 15)
-    world = sw.World(ball(), method, v=v, y=y, dt=1 / 60, events=ground(0.7))
-    for _ in range(60):
-        world.step(10)
-        assert (y > -8 * U * 3.0).all()
-    assert (np.abs(y) < 1e-12).all()
-    assert (np.abs(v) < 1e-6).all()
-    there = y.copy()
-    world.step(30)
-    np.testing.assert_array_equal(y, there)
-
-
-def test_a_ball_at_rest_in_a_world_that_is_kicked_flies_and_one_that_is_lifted_falls() -> None:
-    v, y = np.zeros(3), np.array([0.0, 0.0, 0.0])
-    world = sw.World(ball(), "rk4", v=v, y=y, dt=0.01, events=ground(0.5))
-    world.step(100)
-    assert (y == 0.0).all()
-    v[1], y[2] = 2.0, 1.0
-    world.step(20)
-    assert y[0] == 0.0
-    np.testing.assert_allclose(y[1:], [2.0 * 0.2 - 0.5 * GRAVITY * 0.04, 1.0 - 0.5 * GRAVITY * 0.04], rtol=1e-13)
-    world.step(30)
-    assert world.events["ground"].member.tolist() == [1, 2]
-
-
-def test_a_copy_of_a_world_goes_on_alike() -> None:
-    v, y = np.zeros(5), np.linspace(0.5, 3.0, 5)
-    world = sw.World(ball(), "leapfrog", v=v, y=y, dt=0.01, events=ground(0.8))
-    world.step(70)
-    other = copy.deepcopy(world)
-    world.step(80)
-    other.step(80)
-    np.testing.assert_allclose(other.y, world.y, rtol=0, atol=1e-12)
+def test_copies_of_a_world_have_the_same_events() -> None:
+    """Such as are only counted, and bounces."""
+    for system, events in ((sw.Pendulum(), TWO), (ball(), ground(0.8))):
+        world = sw.World(system, "verlet", **start(), dt=0.1, events=events)
+        world.step(7)
+        others = [copy.copy(world), copy.deepcopy(world)]
+        world.step(30)
+        assert any(each.count.any() for each in world.events.values())
+        for other in others:
+            other.step(30)
+            assert other.events == world.events
+            np.testing.assert_array_equal(other.y, world.y)
 
 
 def test_backward_in_time_a_bounce_of_a_world_is_undone() -> None:
@@ -1063,20 +1019,6 @@ def abs_of(t: Any, h: Any) -> Any:
     return abs(h)
 
 
-def test_a_world_keeps_it_empty_until_it_is_filled() -> None:
-    y = np.array([1.0, 0.0, 0.5])
-    world = sw.World(tank(), "rk4", v=np.zeros((0, 3)), y=y, dt=0.01, events=lowest(0.0, lambda t, h: np.maximum(h, 0.0)))
-    world.step(50)
-    np.testing.assert_allclose(y, [0.65, 0.0, 0.15], atol=1e-14)
-    world.step(150)
-    assert (y == 0.0).all()
-    y[1] = 0.7
-    world.step(50)
-    np.testing.assert_allclose(y, [0.0, 0.35, 0.0], atol=1e-14)
-    world.step(100)
-    assert (y == 0.0).all()
-
-
 @pytest.mark.parametrize("steps", [{"dt": -0.01, "steps": 400}, {"tolerance": 1e-8, "at": [-4.0]}])
 def test_a_tank_back_in_time(steps: dict[str, Any]) -> None:
     full = sw.Event(lambda t, h: h - 1.4, direction=1, then=lambda t, h: np.minimum(h, 1.4), name="full")
@@ -1087,28 +1029,18 @@ def test_a_tank_back_in_time(steps: dict[str, Any]) -> None:
 
 PASSING: list[tuple[Any, sw.Event, dict[str, Any]]] = [
     # A dose of zero at a time, and a kick of zero where a member passes: the state stays as it is, but nothing leads back.
-    (
-        sw.system(order=1)(lambda t, c, *, dose=0.0: -0.3 * c),
-        sw.Event(lambda t, c: np.sin(t), then=lambda t, c, *, dose: c + dose, name="event"),
-        {"y": 1.0},
-    ),
-    (
-        sw.system(lambda t, v, y, *, kick=0.0: -y),
-        sw.Event(lambda t, v, y: y, direction=-1, then=lambda t, v, y, *, kick: (v - kick, y), name="event"),
-        {"v": 0.0, "y": 1.0},
-    ),
+    (sw.system(order=1)(lambda t, c, *, dose=0.0: -0.3 * c),
+     sw.Event(lambda t, c: np.sin(t), then=lambda t, c, *, dose: c + dose, name="event"), {"y": 1.0}),
+    (sw.system(lambda t, v, y, *, kick=0.0: -y),
+     sw.Event(lambda t, v, y: y, direction=-1, then=lambda t, v, y, *, kick: (v - kick, y), name="event"), {"v": 0.0, "y": 1.0}),
     # A clock whose amplitude is set anew where it turns, and a heater that is too weak: the state is another one there.
-    (
-        sw.system(lambda t, v, y: -9.0 * y - 0.1 * v),
-        sw.Event(lambda t, v, y: v, direction=-1, then=lambda t, v, y: (0.0 * v, 1.0 + 0.0 * y), name="event"),
-        {"v": 1.0, "y": 0.0},
-    ),
-    (
-        sw.system(order=1, shape=(2,))(lambda t, y: np.array([10.0 - y[0] + y[1], 0.0])),
-        sw.Event(lambda t, y: y[0] - 20.0, direction=-1, then=lambda t, y: np.array([20.0, 1.0]), name="event"),
-        {"y": np.array([25.0, 0.0])},
-    ),
-]
+    (sw.system(lambda t, v, y: -9.0 * y - 0.1 * v),
+     sw.Event(lambda t, v, y: v, direction=-1, then=lambda t, v, y: (0.0 * v, 1.0 + 0.0 * y), name="event"),
+     {"v": 1.0, "y": 0.0}),
+    (sw.system(order=1, shape=(2,))(lambda t, y: np.array([10.0 - y[0] + y[1], 0.0])),
+     sw.Event(lambda t, y: y[0] - 20.0, direction=-1, then=lambda t, y: np.array([20.0, 1.0]), name="event"),
+     {"y": np.array([25.0, 0.0])}),
+]  # fmt: skip
 
 
 @pytest.mark.parametrize(("method", "steps"), DRIVES)
@@ -1155,6 +1087,7 @@ def test_mistake_an_event_that_leaves_the_state_as_it_is_is_noticed() -> None:
 
 
 @pytest.mark.mutant
+@pytest.mark.usefixtures("without_core")
 def test_mistake_a_member_that_forgets_from_which_side_it_came_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
     """Then a ball at the ground, whose height is a rounding below it, falls through, or bounces again at once."""
     right = adaptive._Resetting.parts
@@ -1171,6 +1104,7 @@ def test_mistake_a_member_that_forgets_from_which_side_it_came_is_noticed(monkey
 
 
 @pytest.mark.mutant
+@pytest.mark.usefixtures("without_core")
 def test_mistake_neighbours_that_begin_anew_are_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
     """Without their carry members of a leapfrog world would have other bits where another bounces."""
 

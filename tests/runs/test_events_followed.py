@@ -2,6 +2,7 @@
 
 import itertools
 import warnings
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -9,6 +10,7 @@ import pytest
 import stepwell as sw
 from stepwell.reference import events as reference_events
 from stepwell.runs.events import adaptive, driver
+from support.own_methods import adams_bashforth_2
 from support.ways import assert_same_run
 
 #: Events of two coordinates: resets, a floor of an empty tank, an exchange, a kick, one that only is noted, one that stops.
@@ -71,23 +73,12 @@ def undamped(t: Any, v: Any, y: Any, *, k: float = 1.0, f: float = 0.5, w: float
     return -k * y + f * np.sin(w * t)
 
 
-def a_step_before(s: Any, t: Any, h: Any, v: Any, y: Any) -> Any:
-    dv, dy = s.dv(t, v, y), s.dy(t, v, y)
-    return s.dv(t - h, v - dv, y - dy), s.dy(t - h, v - dv, y - dy)
-
-
-@sw.method(start=a_step_before)
-def adams_bashforth_2(s: Any, t: Any, h: Any, v: Any, y: Any, dv_before: Any, dy_before: Any) -> Any:
-    dv, dy = s.dv(t, v, y), s.dy(t, v, y)
-    return v + 1.5 * dv - 0.5 * dv_before, y + 1.5 * dy - 0.5 * dy_before, dv, dy
-
-
 #: Methods that carry something else than v between steps, or keep more.
 CARRYING: tuple[Any, ...] = ("verlet", "leapfrog", adams_bashforth_2)
 #: Ways to make such a run with a tolerance.
 ADAPTIVE_WAYS: dict[str, dict[str, Any]] = {
     "three times": {"at": [0.7, 1.5, 2.0]},
-    "many times": {"at": np.linspace(0.05, 2.0, 40)},
+    "many times": {"at": np.linspace(0.05, 2.0, 24)},
     "back": {"at": [-0.7, -2.0]},
     "two tolerances": {"at": [2.0], "tolerance": (1e-6, 1e-9)},
     "few attempts": {"at": [1.0, 2.0], "max_steps": 15},
@@ -141,7 +132,7 @@ def drawn_options(
 
 
 def check_the_core_follows_as_the_reference_does(
-    numbers: range, way: str | None = None, known: bool = False, **more: Any
+    numbers: Sequence[int], way: str | None = None, known: bool = False, **more: Any
 ) -> None:
     occurred, rested = 0, 0
     with warnings.catch_warnings():
@@ -164,20 +155,21 @@ def test_the_core_follows_as_the_reference_does(part: int) -> None:
 @pytest.mark.parametrize("way", [None, "three times", "many times", "back", "jumps"])
 def test_with_known_times_too(way: str | None) -> None:
     check_the_core_follows_as_the_reference_does(
-        range(100, 132 if way is None else 110) if way != "jumps" else range(140, 150), way, known=True
+        range(100, 132 if way is None else 107) if way != "jumps" else range(140, 150), way, known=True
     )
 
 
 @pytest.mark.parametrize("way", [None, "three times", "many times", "back", "jumps"])
 @pytest.mark.parametrize("more", [{"fused": True}, {"held": True}, {"held": True, "fused": True}], ids=str)
 def test_fused_steps_and_sampled_inputs_too(more: dict[str, Any], way: str | None) -> None:
-    numbers = range(201, 233, 2 if "held" in more else 1) if way is None else range(201, 204 if "held" not in more else 207, 2)
+    # Of an adaptive run the samples of each member or of all, at intervals of 0.1 or of 0.37.
+    numbers = range(201, 225, 2 if "held" in more else 1) if way is None else (201, 207 if "held" in more else 203)
     check_the_core_follows_as_the_reference_does(numbers, way, **more)
 
 
 @pytest.mark.parametrize("more", [{}, {"fused": True}, {"known": True}], ids=str)
 def test_float32_too(more: dict[str, Any]) -> None:
-    check_the_core_follows_as_the_reference_does(range(240, 260), dtype="float32", **more)
+    check_the_core_follows_as_the_reference_does(range(240, 253), dtype="float32", **more)
 
 
 @pytest.mark.parametrize(("way", "fused"), [("many times", False), ("back", False), ("jumps", True)])
@@ -186,7 +178,7 @@ def test_runs_that_go_on_too(way: str, fused: bool) -> None:
     occurred = 0
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        for number in range(300, 302 if fused else 306):
+        for number in range(300, 302 if fused else 304):
             system, method, options = drawn_options(number, way, number % 3 == 0, None)
             state = {name: options.pop(name) for name in ("v", "y") if name in options}
             at, tolerance = options.pop("at"), options.pop("tolerance")
@@ -218,13 +210,13 @@ def test_methods_that_carry_something_else_than_v_too(method: Any) -> None:
 
     for number, known in itertools.product(range(1, 30, 4 if method == "verlet" else 8), (False, True)):
         assert_equal(lambda backend, of=(number, known): drawn(of[0], backend, None, of[1], method))
-    pushed = sw.system(order=2)(lambda t, v, y, *, f=1.0: f * np.sin(t) - 1.0)(f=np.linspace(0.0, 2.0, 7))
+    pushed = sw.system(order=2)(lambda t, v, y, *, f=1.0: f * np.sin(t) - 1.0)(f=np.linspace(0.0, 2.0, 5))
     floor = sw.Event(lambda t, v, y: y, direction=-1, then=lambda t, v, y: (np.maximum(v, 0.0), np.maximum(y, 0.0)), name="floor")
     kick = sw.Event(times=1.3, period=1.1, then=lambda t, v, y: (v + 0.9, y), name="kick")
     rested = 0
-    for events in ([OF_A_PLACE["bounce"]()], [OF_A_PLACE["soft"]()], [floor], [floor, kick], [floor, OF_A_PLACE["top"]()]):
+    for events in ([OF_A_PLACE["bounce"]()], [OF_A_PLACE["soft"]()], [floor, kick], [floor, OF_A_PLACE["top"]()]):
         for dt, every in ((0.3, 1), (0.05, None), (0.1, 3))[: 2 if method == "verlet" else 1]:
-            options: Any = {"v": np.zeros(7), "y": np.linspace(0.0, 1.0, 7), "dt": dt, "steps": round(9.0 / dt), "every": every}
+            options: Any = {"v": np.zeros(5), "y": np.linspace(0.0, 1.0, 5), "dt": dt, "steps": round(9.0 / dt), "every": every}
             run = assert_equal(lambda backend, o=options, e=events: sw.integrate(pushed, method, events=e, backend=backend, **o))
             rested += int((run.status == sw.Status.REST).sum())
     assert rested > 10
@@ -405,20 +397,6 @@ def test_trials_of_fused_attempts_fuse_what_attempts_do(method: str) -> None:
     run, reference = (sw.integrate(system, method, backend=backend, **options) for backend in ("rust", "numpy"))
     assert np.sum(run.events["passed"].count) > 10
     assert_same_run(run, reference)
-
-
-def test_a_ball_comes_to_rest_as_the_reference_says() -> None:
-    """Bounces with restitution 0.5 have a limit in time, and lie there: the series is summed, in one step and over many parts."""
-    falling = sw.system(order=2)(lambda t, v, y: -1.0 + 0.0 * y)()
-    bounce = sw.Event(lambda t, v, y: y, direction=-1, then=lambda t, v, y: (-0.5 * v, y), name="bounce")
-    for method, steps in (("rk4", {"dt": 0.37, "steps": 20}), ("merson", {"tolerance": 1e-6, "at": [6.0]})):
-        options: Any = {"v": [0.0, 0.5], "y": [0.5, 0.25], "events": bounce, **steps}
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", sw.EventWarning)
-            run, reference = (sw.integrate(falling, method, backend=backend, **options) for backend in ("rust", "numpy"))
-        assert_same_run(run, reference)
-        assert [str(each) for each in run.findings] == [str(each) for each in reference.findings]
-        assert np.all(run.status == sw.Status.REST), method
 
 
 @pytest.mark.parametrize("backend", ["rust", "numpy"])

@@ -15,7 +15,7 @@ from stepwell.reference import events
 from stepwell.runs.events import collected, trials
 from stepwell.runs.events.evaluated import Evaluated
 from stepwell.runs.events.trials import AdaptiveTrials, Trials
-from support.events import ABLE, U
+from support.events import ABLE, U, without_core  # noqa: F401
 from support.stiff import lorenz
 
 zero = sw.Event(lambda t, v, y: y, name="zero")
@@ -327,6 +327,7 @@ def test_a_touch_without_a_change_of_sign_is_no_event() -> None:
 
 
 @pytest.mark.mutant
+@pytest.mark.usefixtures("without_core")
 def test_mistake_a_step_whose_ends_have_one_sign_is_not_looked_into(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(events, "bends", lambda parts: np.zeros(len(parts.of), dtype=bool))
     with pytest.raises(AssertionError):
@@ -377,6 +378,7 @@ def low_end(trial: Any, low: Any, high: Any, before: Any, after: Any, v: Any, y:
 
 
 @pytest.mark.mutant
+@pytest.mark.usefixtures("without_core")
 def test_mistake_a_straight_line_has_order_two(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(collected, "located", straight)
     assert order_of_driven("rk4") < 3.5
@@ -385,6 +387,7 @@ def test_mistake_a_straight_line_has_order_two(monkeypatch: pytest.MonkeyPatch) 
 
 
 @pytest.mark.mutant
+@pytest.mark.usefixtures("without_core")
 def test_mistake_the_end_before_the_event_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(collected, "located", low_end)
     with pytest.raises(AssertionError):
@@ -394,6 +397,7 @@ def test_mistake_the_end_before_the_event_is_noticed(monkeypatch: pytest.MonkeyP
 
 
 @pytest.mark.mutant
+@pytest.mark.usefixtures("without_core")
 def test_mistake_trials_at_another_time_are_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
     for each in (Trials, AdaptiveTrials):
         step = each.step
@@ -419,6 +423,7 @@ def test_mistake_trials_from_the_carry_of_the_full_step_are_noticed(monkeypatch:
 
 
 @pytest.mark.mutant
+@pytest.mark.usefixtures("without_core")
 def test_mistake_a_zero_that_counts_at_both_ends_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
 
     def twice(look: Any, parts: Any) -> Any:

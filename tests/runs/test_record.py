@@ -244,7 +244,7 @@ MUTANTS = [
     ("rigid_body", "top, free", "0.5 * (", "("),
     ("rigid_body", "top, heavy", "whole + weight * height", "whole - weight * height"),
     ("nbody", "three bodies", "[2] / s.h", "[1] / s.h"),
-    ("springs", "springs: a triangle", "[2] / s.h", "[1] / s.h"),
+    ("springs", "springs: a triangle", "[1] / s.h", "[0] / s.h"),
 ]
 
 

@@ -156,7 +156,7 @@ def built(row: Row) -> tuple[Any, Any, dict[str, Any]]:
         at = at if row["clock"] == "of each member" else at[:, 0]
         options |= {"tolerance": 1e-3, "at": at if every is None else at[-1:], "every": every, "max_steps": 2000}
     else:
-        options |= {"dt": h, "steps": 11, "every": every, "start_step": 12 if row["clock"] == "later" else None}
+        options |= {"dt": h, "steps": 8, "every": every, "start_step": 12 if row["clock"] == "later" else None}
     if row["drive"] == "matrix":
         options["form"] = row["drive"]
     options |= {"fused": "fused" in row["numbers"], "dtype": row["numbers"].split()[0]}

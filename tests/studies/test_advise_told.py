@@ -70,31 +70,16 @@ def test_no_prediction_where_it_makes_no_sense() -> None:
 
 @pytest.mark.usefixtures("unmeasured")
 @pytest.mark.parametrize("name", family(["oscillator", "chain"], lambda name: name == "oscillator"))
-def test_the_margin_is_where_it_blows_up(name: str) -> None:
-    """A run a thousandth inside the limit is bounded, one a thousandth outside grows."""
+def test_the_margin_is_to_the_limit_of_the_system(name: str) -> None:
+    """Runs on both sides of that limit are in ``test_truth.py`` and ``test_stability_limit.py``."""
     scene = sw.scenes.scene(name)
     advice = sw.advise(scene, frame=None, tolerance=1e-1, cost="evaluations")
-    tried = 0
-    for row in (row for row in advice.ranked if row.tolerance is None):
-        assert row.limit_by == "linear"
-        if not row.limit or not math.isfinite(row.limit):
-            continue
-        assert row.margin == row.limit / row.dt
-        assert row.limit == float(sw.stability_limit(scene.system, row.method))
-        sizes = []
-        for share in (0.999, 1.001):
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore", DivergenceWarning)
-                warnings.simplefilter("ignore", sw.AccuracyWarning)
-                run = scene.run(row.method, share * row.limit, steps=20_000, every=20)
-            sizes.append(float(scene.amplitude(run).max()))
-        # Near the limit the axes of the ellipse are in the ratio √((2+Φ)/(2−Φ)) < 45; outside e⁷ and more.
-        assert sizes[0] < 50
-        # Beyond the limit of dopri5 it grows by less.
-        if 20_000 * math.log(float(sw.analyse(scene.system, row.method, dt=1.001 * row.limit).radius)) > 9.0:
-            assert not sizes[1] < 1e3
-        tried += 1
-    assert tried >= 3
+    rows = [row for row in advice.ranked if row.tolerance is None]
+    assert {row.limit_by for row in rows} == {"linear"}
+    limited = [row for row in rows if row.limit and math.isfinite(row.limit)]
+    for row in limited:
+        assert (row.limit, row.margin) == (float(sw.stability_limit(scene.system, row.method)), row.limit / row.dt)
+    assert len(limited) >= 3
 
 
 @pytest.mark.usefixtures("unmeasured")

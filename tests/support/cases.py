@@ -376,24 +376,6 @@ def representative(every: Iterable[Case], several: Mapping[str, int], *salt: str
     return [case for case, lot in drawn.items() if lot in chosen]
 
 
-def thinned(every: Iterable[Case], several: Mapping[str, int], salt: str) -> list[Any]:
-    """Parameters of a test: representative cases, and the others for the long run."""
-    every = list(every)
-    chosen = set(representative(every, several, salt))
-    return family(every, lambda case: case in chosen, str)
-
-
-def by_both_backends(every: Iterable[Case], several: Mapping[str, int], salt: str) -> list[Any]:
-    """Parameters ``case`` and ``backend``: representative cases by the core, a fourth of them by the reference too."""
-    every = list(every)
-    chosen = set(representative(every, several, salt))
-    fourth = {case for case in chosen if number(case, salt) % 4 == 0}
-    pairs = itertools.product(every, ("rust", "numpy"))
-    return family(
-        pairs, lambda case, backend: case in (chosen if backend == "rust" else fourth), lambda *pair: "-".join(map(str, pair))
-    )
-
-
 #: How many methods a test tries with each system, which draws them; in the long run all.
 SOME = pytest.mark.parametrize("some", family([2, None], lambda some: some is not None, lambda some: "some" if some else "all"))
 

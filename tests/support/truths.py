@@ -220,14 +220,7 @@ def forced_error(method: str, dt: float, block: str, backend: str = "rust", star
     """Error of one block at t = 2 on the forced system."""
     damping = None if sw.method(method).needs_acceleration else 0.2
     system = sw.Oscillator(OMEGA, damping, a=sw.Sinusoid(FORCE, DRIVE), form="physical")
-    arguments: dict[str, Any] = {
-        "v": 0.3,
-        "y": 1.0,
-        "dt": dt,
-        "steps": round(END / dt),
-        "backend": backend,
-        "start": start,
-    }
+    arguments: dict[str, Any] = {"v": 0.3, "y": 1.0, "dt": dt, "steps": round(END / dt), "backend": backend, "start": start}
     run = sw.integrate(system, method, **arguments)
     v, y = forced_exact(END, damping or 0.0, 0.3, 1.0)
     return abs(float(run.v[-1]) - v) if block == "v" else abs(float(run.y[-1]) - y)
