@@ -98,7 +98,7 @@ pub struct Round {
 }
 
 impl Round {
-    /// For so many bodies: two rounds of partners and what a chunk may reach beyond them, and whole chunks of bodies.
+    /// An array for `n` bodies: two rounds of partners and what a chunk may read beyond them, and whole chunks of bodies.
     pub fn new(n: usize, dim: usize) -> Self {
         let rounds = (2 * n + 4 * SIDE).next_multiple_of(SIDE);
         Round {
@@ -430,11 +430,11 @@ pub struct Kernel {
     pub rounding: Rounding,
     /// 2 or 3.
     pub dim: usize,
-    /// What it may use.
+    /// The instruction set.
     pub level: Level,
 }
 
-/// What a kernel works on: the bodies meet at the distances of one slab.
+/// The input and output of a kernel: the bodies meet at the distances of one slab.
 pub struct Meeting<'a> {
     /// How many bodies.
     pub n: usize,
