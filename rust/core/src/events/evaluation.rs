@@ -19,7 +19,7 @@ use crate::{
     },
 };
 
-/// Numbers of which values are made, and the stages that have been made of them.
+/// A type of number in which values are computed, and the cache of its stages.
 pub trait Cached: Real {
     /// The stage of a tape that is not cut.
     fn stage(body: Body) -> Result<Arc<Stage<Self>>, Error>;
@@ -97,7 +97,7 @@ impl<T: Cached> Evaluation<T> {
 }
 
 impl Evaluation {
-    /// Computes the values of so many members, by rows, from rows of the state and of the parameters.
+    /// Computes the values of `members` members, by rows, from rows of the state and of the parameters.
     pub fn run(&self, level: Level, (state, parameters): (&[Row], &[Row]), members: usize, values: &mut [f64]) {
         // A power of two, since kernels for fewer members than that are kept.
         let compiled = self.stage.compiled(level, members.next_power_of_two());
@@ -141,17 +141,17 @@ impl<T: Real> Filled<T> {
         Filled { compiled, lanes, states: evaluation.states, rows, values, pool: None, scratch: Vec::new() }
     }
 
-    /// For rows of so many lanes.
+    /// A tile of `lanes` lanes.
     pub(crate) fn of_lanes(evaluation: &Evaluation<T>, level: Level, lanes: usize) -> Filled<T> {
         Filled::new(evaluation, evaluation.stage.compiled_for_lanes(level, lanes))
     }
 
-    /// A row of the state or, behind these, of the parameters; of those that nothing depends on there may be none.
+    /// A row of the state or, after these, of the parameters; empty where no value depends on them.
     pub(crate) fn row(&mut self, i: usize) -> &mut [T] {
         self.rows.chunks_exact_mut(self.lanes).nth(i).unwrap_or_default()
     }
 
-    /// Takes the parameters of so many members from `first` on.
+    /// Takes the parameters of the `count` members from `first` on.
     pub(crate) fn prepare(&mut self, parameters: &[Row], first: usize, count: usize) {
         for (i, parameter) in parameters.iter().enumerate() {
             let row = self.row(self.states + i);
@@ -198,10 +198,10 @@ pub(crate) struct Evaluator<'a, T: Real = f64> {
 
 /// Fewer members are computed one by one.
 pub(super) const FEW: usize = 3;
-/// So many together are worth the most lanes.
+/// From this many members on, the widest tile pays.
 const MANY: usize = 64;
 
-/// A tile for about so many members, with the parameters that all have in common.
+/// A tile for about `members` members, with the parameters that all have in common.
 fn tile_of<'t, T: Real>(
     tile: &'t mut Option<Filled<T>>,
     evaluation: &Evaluation<T>,

@@ -1,4 +1,4 @@
-//! What is known of a motion between the states of its steps: steps of any length, rates, and the quantities of events.
+//! The motion between the states of a run: steps of any length, rates, and the quantities of events.
 
 use std::{fmt, sync::Mutex};
 
@@ -41,7 +41,7 @@ pub enum Trial<'a> {
     Single(Values<'a, f32>),
 }
 
-/// What computes it.
+/// The evaluator of a [`Trial`].
 enum Trials<'a> {
     Double(Evaluator<'a>),
     Single(Evaluator<'a, f32>),
@@ -133,7 +133,7 @@ pub struct Events<'a> {
     pub jumps: Option<Times<'a>>,
     /// What hot loops may use.
     pub level: Level,
-    /// What was found so far.
+    /// The occurrences found so far.
     pub found: Mutex<Found>,
 }
 
@@ -283,7 +283,7 @@ impl<'a> Motion<'a> {
         slope.run(&at.members, &inputs).into_iter().map(finite).collect()
     }
 
-    /// The same from a short step.
+    /// The slopes as differences over a short step.
     fn differences(&mut self, e: usize, at: &States, lengths: &[f64], rates: &[f64]) -> Vec<f64> {
         let sign = self.events.sign;
         let t = at.t.iter().zip(lengths).map(|(t, h)| sign * (sign * *t + SHORT * (sign * *h))).collect();
