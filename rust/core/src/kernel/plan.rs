@@ -52,7 +52,7 @@ impl<I> Step<I> {
         Step { instruction, id, of, n: operands.len() as u8 }
     }
 
-    /// What it reads.
+    /// The values that it reads.
     pub(crate) fn of(&self) -> &[Id] {
         &self.of[..self.n as usize]
     }
@@ -64,7 +64,7 @@ pub(crate) struct KernelPlan<I> {
     /// Of each value where it comes from.
     pub sources: Vec<Source>,
     pub steps: Vec<Step<I>>,
-    /// What replaces each number of the state; none if it stays.
+    /// The value that replaces each number of the state; none if it stays.
     pub next: Vec<Option<Id>>,
     /// The value of each number of the state before the step, if it is read.
     pub old: Vec<Option<Id>>,
@@ -245,7 +245,7 @@ fn uses(body: &Body) -> Vec<u32> {
     uses
 }
 
-/// What a comparison and a choice by it are made by.
+/// An instruction that does both a comparison and the choice by it.
 #[derive(Clone, Copy, Debug)]
 enum Joined<I> {
     /// It compares two numbers and chooses of two others.

@@ -15,7 +15,7 @@ pub(crate) struct Uses {
 }
 
 impl Uses {
-    /// Of so many values.
+    /// A list of uses of `values` values, empty.
     pub(crate) fn new(values: usize) -> Uses {
         Uses { first: vec![NONE; values], uses: Vec::new() }
     }
@@ -63,7 +63,7 @@ pub(crate) struct Registers {
 const NO_REGISTER: u8 = u8::MAX;
 
 impl Registers {
-    /// So many registers for so many values.
+    /// An allocator of `count` registers for `values` values.
     pub(crate) fn new(count: u8, values: usize) -> Registers {
         let free = if count == 32 { u32::MAX } else { (1 << count) - 1 };
         Registers { holds: [NONE; 32], of: vec![NO_REGISTER; values], free, kept: 0, locked: 0, count }

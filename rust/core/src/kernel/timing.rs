@@ -2,13 +2,13 @@
 
 use crate::tape::Op;
 
-/// What carries out an operation.
+/// An execution unit of the CPU.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Unit {
     Sum,
     Product,
     Divider,
-    /// What moves numbers between lanes.
+    /// The unit that moves numbers between lanes.
     Moves,
     Bits,
 }

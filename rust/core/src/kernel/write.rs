@@ -33,7 +33,7 @@ pub(crate) trait MakeOperation: Machine {
     fn make(writer: &mut Writer<Self>, step: &Step<Self::Instruction>, vector: usize, of: &[Value]) -> Option<u8>;
 }
 
-/// What is written, and what is where meanwhile.
+/// The code of a kernel while it is written, and where each value is at that point.
 #[derive(Debug)]
 pub(crate) struct Writer<'a, M: MakeOperation> {
     pub plan: &'a KernelPlan<M::Instruction>,
@@ -202,8 +202,8 @@ impl<M: MakeOperation> Writer<'_, M> {
         }
     }
 
-    /// The same for an instruction that overwrites an operand: one of `over` if it is not needed any more. None of the registers
-    /// `apart`.
+    /// As `result`, for an instruction that overwrites an operand: one of `over` if it is not needed any more. None of the
+    /// registers `apart`.
     pub(crate) fn result_over(&mut self, id: u32, vector: usize, of: &[Value], over: &[Value], apart: &[u8]) -> Option<u8> {
         let home = self.free_home(id, vector).filter(|home| !apart.contains(home));
         let own = over.iter().find_map(|value| {

@@ -34,7 +34,7 @@ pub(crate) enum Instruction {
     SubMul,
     /// By the bits of the first, of the second and the third.
     Select,
-    /// The same.
+    /// A copy of the operand.
     Copy,
 }
 

@@ -35,7 +35,7 @@ impl Packs {
         self.packs.is_empty()
     }
 
-    /// What a trial finds.
+    /// The packs that a trial finds.
     pub(crate) fn find(body: &Body, trial: Trial) -> Packs {
         let mut finder = Finder::new(body);
         if trial.together > 1 {
@@ -52,7 +52,7 @@ impl Packs {
     }
 }
 
-/// What an operation is, without its operands.
+/// The kind of an operation: the operation without its operands.
 fn kind(op: Op) -> Op {
     op.with(|_| 0)
 }
@@ -192,7 +192,7 @@ impl Finder {
         }
     }
 
-    /// The operands of the lanes.
+    /// Packs the operands of the lanes.
     fn below(&mut self, lanes: &[Id]) {
         let (_, count) = self.packs.ops[lanes[0] as usize].operands();
         for at in 0..count {
@@ -201,7 +201,7 @@ impl Finder {
         }
     }
 
-    /// What is made of the lanes.
+    /// Packs the users of the lanes.
     fn above(&mut self, lanes: &[Id]) {
         for user in self.users[lanes[0] as usize].clone() {
             if self.packs.of[user as usize].is_some() {

@@ -50,7 +50,7 @@ pub struct Vector {
 }
 
 impl Vector {
-    /// What it reads.
+    /// The vectors that it reads.
     pub(crate) fn of(&self) -> &[u32] {
         &self.of[..self.operands as usize]
     }

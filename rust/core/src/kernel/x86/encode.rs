@@ -35,17 +35,17 @@ const fn form(map: u8, prefix: u8, opcode: u8) -> Form {
     Form { map, double: codes(prefix, opcode), single: codes(prefix, opcode), wide: false }
 }
 
-/// The same with another opcode for numbers of 32 bits.
+/// An instruction with another opcode for numbers of 32 bits.
 const fn sized(map: u8, prefix: u8, double: u8, single: u8) -> Form {
     Form { single: codes(prefix, single), ..form(map, prefix, double) }
 }
 
-/// Numbers of 64 bits have the prefix 66, those of 32 bits have none.
+/// An instruction with prefix 66 for numbers of 64 bits, and none for those of 32 bits.
 const fn plain(opcode: u8) -> Form {
     Form { single: codes(0, opcode), ..form(1, P66, opcode) }
 }
 
-/// The same with an instruction for the first number only.
+/// As `plain`, with an instruction for the first number only.
 const fn arithmetic(opcode: u8) -> Form {
     Form {
         double: Codes { first: Some((PF2, opcode)), ..codes(P66, opcode) },
@@ -159,7 +159,7 @@ pub(crate) enum General {
 pub(crate) struct Memory {
     pub base: General,
     pub at: i32,
-    /// What is in rax is added, as so many numbers.
+    /// Whether rax is added, as a count of numbers.
     pub indexed: bool,
     /// One number, for all lanes.
     pub broadcast: bool,
@@ -191,7 +191,7 @@ pub(crate) struct Code {
 }
 
 impl Code {
-    /// What there is of a form for numbers of this size.
+    /// The codes of a form for numbers of this size.
     pub(crate) fn codes(&self, form: Form) -> Codes {
         if self.size == 8 { form.double } else { form.single }
     }

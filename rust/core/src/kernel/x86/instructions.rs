@@ -35,7 +35,7 @@ pub(crate) enum Instruction {
     Select(bool),
     /// The comparison of the first two by predicate chooses of the third and the fourth.
     Pick(u8),
-    /// The same.
+    /// A copy of the operand.
     Copy,
     /// Numbers of one member between lanes.
     Move(Move),
