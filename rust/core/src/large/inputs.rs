@@ -30,7 +30,7 @@ pub(crate) struct Inputs {
 }
 
 impl Inputs {
-    /// Those of a member: `inputs[0]` and so on.
+    /// The inputs of a member: `inputs[0]` and so on.
     pub(crate) fn new(spec: &Spec, member: usize) -> Inputs {
         let signature = &spec.signature;
         let numbers = spec.rows.iter().map(|row| row.at(member)).collect();

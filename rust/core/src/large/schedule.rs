@@ -103,7 +103,7 @@ pub enum Goal {
 
 #[derive(Clone, Copy, Debug)]
 enum Node {
-    /// What is in a row at the start.
+    /// The content of a row at the start.
     Start(usize),
     Ask(Rate, Time, usize, usize),
     Add(usize, usize),
@@ -142,9 +142,9 @@ struct PassPlan {
     results: Vec<usize>,
     /// Of each node that is asked for, its turn.
     turn: Vec<Option<usize>>,
-    /// What each pass writes.
+    /// The nodes that each pass writes.
     writes: Vec<BTreeSet<usize>>,
-    /// Of each node the pass that writes it.
+    /// For each node the pass that writes it.
     pass: Vec<Option<usize>>,
 }
 
@@ -270,7 +270,7 @@ impl PassPlan {
         }
     }
 
-    /// What a pass computes, and what it reads.
+    /// The nodes that a pass computes, and those that it reads.
     fn work(&self, pass: usize) -> (BTreeSet<usize>, BTreeSet<usize>) {
         let (mut computed, mut read) = (BTreeSet::new(), BTreeSet::new());
         let mut open: Vec<usize> = self.writes[pass].iter().copied().collect();

@@ -66,8 +66,8 @@ struct Part<'a> {
     done: bool,
 }
 
-/// Calls a function for parts of the bodies without mass, on so many threads: with the numbers of some, the forces on the bodies
-/// from a first one on, and the number of that one.
+/// Calls a function on `threads` threads, each time for a part of the bodies without mass: with their numbers, the forces on the
+/// bodies from a first one on, and the number of that one.
 pub(super) fn share_massless(
     threads: usize,
     bodies: &[u32],

@@ -178,7 +178,7 @@ impl<const D: usize, const DAMPED: bool> Forces<'_, D, DAMPED> {
         ends
     }
 
-    /// The sums of the forces on so many particles, one by one.
+    /// The sums of the forces on the `count` particles from `first` on, one by one.
     #[inline(always)]
     fn sums_of_singles(order: &Order, rows: &Rows, first: usize, count: usize) -> [Vector; D] {
         let mut sums = [[-0.0; SIDE]; D];
@@ -228,7 +228,7 @@ impl<const D: usize, const DAMPED: bool> Forces<'_, D, DAMPED> {
 }
 
 impl<const D: usize, const DAMPED: bool> Forces<'_, D, DAMPED> {
-    /// The rates of the particles from a place on, of which these are the sums of the forces.
+    /// Writes the rates of the particles from `at` on, from the sums of their forces.
     #[inline(always)]
     fn finish(rows: &Rows, at: usize, sums: [Vector; D], speeds: &[[f64; D]], out: &mut [[f64; D]]) {
         let by_mass = load(&rows.by_mass, at);

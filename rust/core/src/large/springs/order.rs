@@ -67,7 +67,7 @@ fn ends_of(pairs: &[u32], spring: u32) -> [u32; 2] {
 }
 
 impl Order {
-    /// Of the springs between these pairs of particles, of which there are `n`; what is fixed adds no forces.
+    /// The order of the springs between these pairs of the `n` particles; no forces are added for fixed ones.
     pub(crate) fn new(n: usize, pairs: &[u32], is_fixed: &[bool]) -> Order {
         let mut springs: Vec<u32> = (0..(pairs.len() / 2) as u32).collect();
         let key = |spring: &u32| {
