@@ -1,5 +1,5 @@
-//! What implicit methods need of a system: its Jacobian J at the start of a step, and the solution of (M − γhJ)·x = r, where M is
-//! its mass matrix, or that of units.
+//! The linear algebra of implicit methods: the Jacobian J of a system at the start of a step, and the solution of
+//! (M − γhJ)·x = r, where M is the mass matrix of the system, or the unit matrix.
 //!
 //! `reference/implicit.py` has the same operations in the same order.
 

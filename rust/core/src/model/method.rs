@@ -20,9 +20,9 @@ pub struct Record {
     pub family: &'static str,
     /// The undamped oscillator is stable for Φ = ω₀T below this; 0 means never.
     pub limit: f64,
-    /// What it needs from a system.
+    /// Its requirements on a system.
     pub needs: Needs,
-    /// Its carry: what it keeps between steps in place of `v`, if anything.
+    /// Its carry: the block that it keeps between steps in place of `v`, if any.
     pub carry: Option<Carry>,
     /// Its estimate of the error of a step, if it has one: adaptive steps need it.
     pub estimate: Option<Estimate>,
@@ -42,7 +42,7 @@ pub(crate) type Blocks = fn(Rates, Time, Length, Block, Block) -> (Block, Block)
 /// A function from a state to blocks of v and y, one pair for each power.
 pub(crate) type Powers = fn(Rates, Time, Length, Block, Block) -> Vec<(Block, Block)>;
 
-/// What a method needs from a system.
+/// The requirements of a method on a system.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Needs {
     /// Nothing beyond the two increments.
@@ -51,7 +51,7 @@ pub enum Needs {
     Acceleration,
 }
 
-/// What a method keeps between steps in place of the velocity.
+/// The block that a method keeps between steps in place of the velocity.
 #[derive(Debug)]
 pub struct Carry {
     /// Its name.

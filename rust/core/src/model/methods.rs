@@ -15,7 +15,7 @@ use crate::error::Error;
 pub struct Method {
     /// The name that users read.
     pub name: &'static str,
-    /// What it needs from a system.
+    /// Its requirements on a system.
     pub needs: Needs,
     /// Whether it carries something in place of v between steps.
     pub carries: bool,

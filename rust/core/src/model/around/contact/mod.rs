@@ -132,14 +132,14 @@ impl<N: Number> Contacts<N> {
         self.rods.is_some()
     }
 
-    /// What becomes of points on rods, in place. The state before the step comes first.
+    /// Applies contact to points on rods, in place. The state before the step comes first.
     pub(crate) fn resolve_joined(&self, before: [&[N]; 2], [v, y]: [&mut [N]; 2]) {
         if let Some(rods) = &self.rods {
             rods.resolve(&self.surfaces, before, v, y);
         }
     }
 
-    /// What becomes of a point, in place, and whether it met a surface. The state before the step comes first.
+    /// Applies contact to a point, in place, and returns whether it met a surface. The state before the step comes first.
     pub(crate) fn resolve_point(&self, before: [&[N]; 2], [v, y]: [&mut [N]; 2]) -> Option<N::Truth> {
         let step = Step::new(self.h, before, [v, y]);
         let mut touched: Option<N::Truth> = None;
@@ -221,7 +221,7 @@ pub struct Carry<'a> {
     finish: Option<&'a Program>,
 }
 
-/// Those of a method.
+/// The programs by which a method goes on after a bounce.
 pub fn carry(method: &Method, choice: usize) -> Carry<'_> {
     Carry { start: method.start(choice), finish: method.finish(choice) }
 }
@@ -234,7 +234,7 @@ pub(crate) struct Springs<N: Number> {
 }
 
 impl<N: Number> Springs<N> {
-    /// Those that are given; None without any.
+    /// The springs of this model's surfaces, or None.
     pub(crate) fn new(p: &Parameters<N>) -> Option<Springs<N>> {
         let surfaces = surface::all(p, |way| way == ContactMode::Spring);
         (!surfaces.is_empty()).then(|| Springs { dim: dimensions(p.signature), fixed: fixed(p.signature), surfaces })
@@ -250,7 +250,7 @@ impl<N: Number> Springs<N> {
         }
     }
 
-    /// The same in D directions, to the points between those that are fixed.
+    /// The pushes in D directions, to the points between those that are fixed.
     #[inline(always)]
     fn push_points<const D: usize>(&self, y: &[N], dv: &mut [N]) {
         let (y, dv) = (y.as_chunks::<D>().0, dv.as_chunks_mut::<D>().0);
