@@ -40,8 +40,8 @@ const MIN_MEMBERS_FOR_THREADS: usize = 256;
 /// Operations of a run, by lanes, that takes some tenths of a millisecond.
 const MOST_OPERATIONS: usize = 1 << 21;
 
-/// Makes the run, and returns whether it did: where members stand at the start is not found for a system whose attempt is not one
-/// tape. The monitor is as that of [`crate::run::fixed::run`].
+/// Runs all members. Returns false, having done nothing, if an attempt is not a single tape: the caller then supplies the
+/// controllers' initial state. The monitor is as that of [`crate::run::fixed::run`].
 pub fn run(plan: &AdaptiveRun, arrays: Arrays, monitor: &mut dyn FnMut(f64) -> bool) -> Result<bool, Error> {
     let b = plan.members;
     let traced = plan.model.traced()?;
@@ -99,12 +99,12 @@ pub fn run(plan: &AdaptiveRun, arrays: Arrays, monitor: &mut dyn FnMut(f64) -> b
 /// Members in lanes, which are made once for runs that differ in their start alone.
 pub struct Prepared {
     group: Option<Box<dyn AdaptiveBatch>>,
-    /// After so many calls of the monitor a run takes longer than others wait for.
+    /// A run that polls the monitor more often is too long to hold the lock.
     most_checks: usize,
 }
 
 impl Prepared {
-    /// For runs such as this one, by one thread; None if where members stand at the start is to be found by others.
+    /// Prepares runs such as this one, by one thread; None if the caller must supply the controllers' initial state.
     pub fn new(plan: &AdaptiveRun) -> Result<Option<Self>, Error> {
         let traced = plan.model.traced()?;
         plan.model.room(traced.shape, 1)?;
@@ -119,7 +119,7 @@ impl Prepared {
         self.group.as_mut().is_some_and(|group| group.renew(spec))
     }
 
-    /// Makes the run, and returns whether it did: not if it takes long.
+    /// Runs all members. Returns false if that takes long.
     pub fn run(&mut self, plan: &AdaptiveRun, arrays: Arrays) -> Result<bool, Error> {
         let Some(group) = self.group.take() else { return Ok(false) };
         let mut worker = Worker::of(plan, group);
@@ -347,7 +347,7 @@ impl<'a> Worker<'a> {
         Ok(())
     }
 
-    /// Keeps where all lanes stand, the first of which has this member.
+    /// Logs the states of all lanes, the first of which has member `first`.
     fn note(&self, part: &mut Part, first: usize, row: usize) {
         let (p, q, rows) = (self.plan.v.len(), self.plan.y.len(), self.plan.at.len());
         let members = first..part.count.min(first + self.group.lanes());
@@ -644,7 +644,7 @@ impl<'a> Worker<'a> {
         true
     }
 
-    /// Counts so many extra steps of a lane.
+    /// Counts `steps` extra steps of a lane.
     fn count_extra(&mut self, lane: usize, steps: usize) {
         match self.group.row_mut(self.places.extra_steps) {
             Some(row) => row[lane] += steps as f64,

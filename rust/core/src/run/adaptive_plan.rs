@@ -1,4 +1,4 @@
-//! What a run of adaptive steps is made from, what it fills, and the shares of both that a thread and a lane work on.
+//! The input and output of a run of adaptive steps, and the shares of both that a thread and a lane work on.
 
 use super::{
     Model,
@@ -13,16 +13,16 @@ use crate::{
 /// A run to be made.
 #[derive(Clone, Debug)]
 pub struct AdaptiveRun<'a> {
-    /// What to step, and how.
+    /// The system and the method.
     pub model: Model<'a>,
-    /// What hot loops may use.
+    /// The instruction set and threads of hot loops.
     pub machine: Machine,
     /// Times to keep the state at, ascending, by rows.
     pub at: Vec<Row<'a>>,
     /// The times that no step crosses, by rows: those just before each, ascending, and behind them those just after.
     pub jumps: Vec<Row<'a>>,
-    /// The members' paces at the start, by rows, in the order of [`crate::step::pace::Pace::numbers`], and what stands behind
-    /// them.
+    /// The members' paces at the start, by rows, in the order of [`crate::step::pace::Pace::numbers`], and after them
+    /// their scales: group sizes and tolerances.
     pub paces: Vec<Row<'a>>,
     /// Whether the steps to try first and the lengths of the blocks are still to be found: see `Pace::begun`.
     pub begins: bool,
@@ -32,7 +32,7 @@ pub struct AdaptiveRun<'a> {
     pub is_part: bool,
     /// The most attempts of a member.
     pub budget: i64,
-    /// Every so manieth accepted step is kept in [`Arrays::steps`]; 0 for none. A member that has filled its rows there ends,
+    /// Every `every`-th accepted step is kept in [`Arrays::steps`]; 0 for none. A member that has filled its rows there ends,
     /// with a status of its own, and can go on from its pace.
     pub every: i64,
     /// Velocities at the start, by rows.
@@ -41,7 +41,7 @@ pub struct AdaptiveRun<'a> {
     pub y: Vec<Row<'a>>,
     /// How many members.
     pub members: usize,
-    /// What is looked for in the steps.
+    /// The events to look for.
     pub events: Option<&'a Events<'a>>,
 }
 
@@ -60,7 +60,7 @@ pub(super) enum Status {
     NotFinite = 4,
 }
 
-/// What a run fills: arrays of rows of one number per member.
+/// The output of a run: arrays of rows of one number per member.
 #[derive(Debug)]
 pub struct Arrays<'a> {
     /// The states at the output times; NaN from where a member stopped.

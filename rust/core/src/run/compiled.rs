@@ -82,7 +82,7 @@ fn counts(body: &Body) -> Counts {
 }
 
 impl Model<'_> {
-    /// Traces and compiles the step anew, for so many members; none if it is too long for one tape.
+    /// Traces and compiles the step anew, for `members` members; none if it is too long for one tape.
     pub fn compiled(&self, machine: Machine, members: usize) -> Result<Option<Compiled>, Error> {
         let traced = self.traced()?;
         if !matches!(self.way(&traced, machine, members, explained_steps(&traced)), StepStrategy::Tape) {

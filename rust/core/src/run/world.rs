@@ -205,12 +205,12 @@ impl<T: Steppable> World<T> {
         self.carry_on(carry, v, y);
     }
 
-    /// What a sampled controller remembers, as rows of one number per member.
+    /// The memory of a sampled controller, as rows of one number per member.
     pub fn memory(&self) -> Vec<T> {
         self.held().split_off(self.sizes.0 + self.kept - self.memory * self.members)
     }
 
-    /// Lets a sampled controller remember this, as rows of one number per member.
+    /// Sets the memory of a sampled controller, as rows of one number per member.
     pub fn remember(&mut self, memory: &[T]) {
         if memory.len() != self.memory * self.members {
             return;

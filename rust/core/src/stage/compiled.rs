@@ -20,14 +20,14 @@ pub struct Stage<T: Real = f64> {
     pub split: Split,
     /// By the number of members that they are for.
     compiled: CompiledStages<T>,
-    /// Those for rows of a length that something else has set.
+    /// Kernels for rows of a given length.
     long: CompiledStages<T>,
 }
 
-/// CompiledStages, each for a level and a number.
+/// Kernels, each for a level and a number.
 type CompiledStages<T> = Mutex<Vec<(Level, usize, Arc<CompiledStage<T>>)>>;
 
-/// What makes the steps of a stage, and what is computed before them, over rows of one length.
+/// The kernels of a stage, with the interpreters for values computed before its steps, over rows of one length.
 pub(crate) struct CompiledStage<T: Real = f64> {
     /// The hot loop.
     pub runner: Runner<T>,
@@ -119,19 +119,19 @@ impl<T: Real> Stage<T> {
         [&split.run, &split.member, &split.step, &split.clock, &split.body].iter().map(|body| body.ops.len()).sum::<usize>()
     }
 
-    /// What makes its steps in a run of so many members.
+    /// The kernels for a run of `members` members.
     pub(crate) fn compiled(&self, level: Level, members: usize) -> Arc<CompiledStage<T>> {
         // Some more or fewer of many members are no reason for another tile.
         let members = if members > MANY_MEMBERS { usize::MAX } else { members };
         self.find(&self.compiled, level, members, |body| Runner::new(body, level, members))
     }
 
-    /// What makes its steps over rows of so many lanes.
+    /// The kernels over rows of `lanes` lanes.
     pub(crate) fn compiled_for_lanes(&self, level: Level, lanes: usize) -> Arc<CompiledStage<T>> {
         self.find(&self.long, level, lanes, |body| Runner::long(body, level, lanes))
     }
 
-    /// What was made before for such a number, or what is made now.
+    /// The kernels for a number of members or lanes, built on first use.
     fn find(
         &self,
         compiled: &CompiledStages<T>,
@@ -153,7 +153,7 @@ impl<T: Real> Stage<T> {
     }
 }
 
-/// Above so many members the best tile, of some hundreds, does not depend on their number.
+/// Above this many members the best tile, of some hundreds, does not depend on their number.
 const MANY_MEMBERS: usize = 1024;
 /// Kernels of different lengths that are kept for a stage.
 const MOST_COMPILED: usize = 16;

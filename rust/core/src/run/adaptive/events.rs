@@ -14,7 +14,7 @@ use crate::{
     step::pace::{Pace, length},
 };
 
-/// What an event needs in the lanes.
+/// The quantity of an event in the lanes.
 struct Quantity {
     value: Filled,
     slope: Option<Filled>,
