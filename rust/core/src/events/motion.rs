@@ -131,7 +131,7 @@ pub struct Events<'a> {
     pub way: f64,
     /// The jumps of adaptive steps, as known times.
     pub jumps: Option<Times<'a>>,
-    /// What hot loops may use.
+    /// The instruction set of hot loops.
     pub level: Level,
     /// The occurrences found so far.
     pub found: Mutex<Found>,

@@ -32,7 +32,7 @@ pub struct PreparedStage<T: Real = f64> {
     compiled: Arc<CompiledStage<T>>,
     /// Numbers that all members have in common, in the order of [`Split::sources`].
     shared: Vec<T>,
-    /// These numbers in the layout of the kernel for entries of steps, and whether that kernel is machine code.
+    /// The shared numbers in the layout of the kernel for entries of steps, and whether that kernel is machine code.
     shared_pool: Vec<T>,
     shared_pool_for: Option<KernelKind>,
     /// The parts of a step of float32 that are computed in float64.

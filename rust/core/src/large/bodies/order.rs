@@ -57,7 +57,7 @@ impl Order {
         }
     }
 
-    /// These blocks in this order.
+    /// The rows of these blocks in this order.
     pub(super) fn all_of<'a, const B: usize>(&'a mut self, dim: usize, blocks: [&'a [f64]; B]) -> [&'a [f64]; B] {
         self.arranged(dim, blocks, usize::MAX)
     }
