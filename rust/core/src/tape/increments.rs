@@ -1,4 +1,4 @@
-//! The first half of [`super::fuse::fuse`]: increments are not rounded before they are added.
+//! The second pass of [`super::fuse::fuse`]: increments are not rounded before they are added.
 //!
 //! Methods compute with increments, a factor that depends on the step h times something of the state: h·v̇. Here an increment is
 //! kept as c·factor·x, a number, what is known before the step, and a value:
@@ -37,7 +37,7 @@ struct Rewriting<'a> {
     values: Vec<Value>,
 }
 
-/// The same tape, for these values, in which increments are multiplied last; and the values on it.
+/// Multiplies increments last. Returns the new tape and the new ids of the roots.
 pub(super) fn increments_last(tape: &Tape, roots: &[Id]) -> (Tape, Vec<Id>) {
     let (tape, roots) = &negated_sums(tape, roots);
     let made = Tape { written: tape.written, ..Tape::new(tape.precision()) };
@@ -50,8 +50,8 @@ pub(super) fn increments_last(tape: &Tape, roots: &[Id]) -> (Tape, Vec<Id>) {
     (work.made, roots)
 }
 
-/// The same tape with −(x + y) in place of (−x) − y. Of −x and −y a tape writes (−x) − y or (−y) − x, whichever it comes upon
-/// first, and what is made of it must not depend on that.
+/// Rewrites (−x) − y as −(x + y). Of −x and −y a tape has (−x) − y or (−y) − x, depending on which comes first, and the result
+/// must not depend on that.
 fn negated_sums(tape: &Tape, roots: &[Id]) -> (Tape, Vec<Id>) {
     let mut made = Tape { written: tape.written, ..Tape::new(tape.precision()) };
     let mut place = Vec::<Id>::with_capacity(tape.ops().len());

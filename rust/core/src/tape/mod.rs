@@ -285,7 +285,7 @@ impl Tape {
         (!op.rounds() || !self.precision.number(made).is_nan()).then_some(made)
     }
 
-    /// The same operations in the same places, with some replaced by others of the same operands or earlier ones.
+    /// The tape with some operations replaced, in place, by others of the same operands or earlier ones.
     fn rewritten(&self, replace: impl Fn(Id, Op) -> Op) -> Tape {
         let ops: Vec<Op> = self.ops.iter().enumerate().map(|(id, op)| replace(id as Id, *op)).collect();
         let seen = ops.iter().enumerate().map(|(id, op)| (*op, id as Id)).collect();

@@ -52,8 +52,8 @@ impl Precision {
         1 << (8 * self.bytes() - 1)
     }
 
-    /// What is meant by a pattern of 64 bits: all bits, that of the sign and all others are those of a number of this precision.
-    /// Any other is the caller's to choose for it.
+    /// Converts a pattern of 64 bits: all bits, the bit of the sign and all others become those of a number of this precision.
+    /// Any other pattern is the caller's to choose for it.
     pub(crate) fn pattern(self, bits: u64) -> u64 {
         const ALL: u64 = u64::MAX;
         const SIGN: u64 = 1 << 63;

@@ -28,7 +28,7 @@ pub(crate) enum Mark {
     Factors(Factors, Option<[f64; 2]>),
 }
 
-/// What is noted while a series is traced.
+/// Marks that are noted while a series is traced.
 #[derive(Default)]
 struct Marks {
     values: HashMap<Id, Mark>,
@@ -70,8 +70,8 @@ pub(crate) type Factors = Vec<(Symbol, Symbol)>;
 /// A coefficient; none if it is known to be zero.
 type Term = Option<Symbol>;
 
-/// The coefficients of a solution, from the first to the one of that order. The time is its value, the unit in powers of which
-/// they are, and this over the one of the rates.
+/// The Taylor coefficients 1 to `order` of a solution. The time is its value, the unit in whose powers they count, and this unit
+/// over that of the rates.
 pub(crate) fn of_solution(
     order: u32,
     start: &[Symbol],
@@ -355,8 +355,8 @@ impl Series {
     }
 }
 
-/// What a number divided by k is the sum of: its product with 1/k, and what the rounding of 1/k leaves out. This takes a third of
-/// the time of a division.
+/// The terms of a number divided by k: its product with 1/k, and the error by the rounding of 1/k. This takes a third of the time
+/// of a division.
 fn parts(number: Symbol, k: f64) -> Vec<Symbol> {
     const WHOLE: i128 = 1 << 90; // times the reciprocal of any order this is a whole number
     let reciprocal = 1.0 / k;
