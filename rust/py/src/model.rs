@@ -1,4 +1,4 @@
-//! What to step: names, parameters and tables that stay Python's.
+//! The model to step: names, parameters and tables that stay Python's.
 
 use std::sync::Arc;
 
@@ -70,7 +70,7 @@ pub(crate) fn core_error(error: Error) -> PyErr {
     error_of(name, error.to_string())
 }
 
-/// That of 32 bits, or that of 64.
+/// The precision of 32 bits, or of 64.
 pub(crate) fn precision(single: bool) -> Precision {
     if single { Precision::Single } else { Precision::Double }
 }
@@ -93,7 +93,7 @@ impl Equations {
         self.0.reads_time()
     }
 
-    /// Whether the rates are made of pieces, one of which is chosen by the state or the time.
+    /// Whether the rates are piecewise, with a choice by the state or the time.
     #[getter]
     fn chooses(&self) -> bool {
         self.0.chooses()
@@ -325,12 +325,12 @@ impl ModelSpec {
         Ok(Spec { signature: self.signature.clone(), rows: all, tables: self::tables(tables)? })
     }
 
-    /// What the core steps.
+    /// The model that the core steps.
     pub fn model<'a>(&'a self, how: StepKind, rows: &'a Rows<'_>, tables: &'a Tables<'_>) -> PyResult<Model<'a>> {
         Ok(self.of(how, self.spec(rows, tables)?))
     }
 
-    /// What the core steps, of a system with parameters.
+    /// The model that the core steps, of a system with parameters.
     pub fn of<'a>(&self, how: StepKind, spec: Spec<'a>) -> Model<'a> {
         let Self { signature, record, fused, precision, .. } = self;
         // The matrix form says itself which products are fused, whatever they are made of.

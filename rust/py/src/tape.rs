@@ -382,7 +382,7 @@ impl Tape {
         Symbol { tape: Arc::clone(&self.0), id }
     }
 
-    /// A constant, by its bits, of which a tape of 32 bits has the lower half.
+    /// A constant, by its bits; a tape of 32 bits takes the lower half.
     fn constant(&self, bits: u64) -> Symbol {
         self.leaf(Op::Const(bits))
     }
@@ -500,8 +500,8 @@ impl Tape {
         Ok((Tape(fused), symbols))
     }
 
-    /// These values for many members at once, from so many numbers of a state and from parameters; None if they depend on a step
-    /// or a time. Where they depend on samples, events alone take them.
+    /// An evaluation of these values for many members at once, from `states` numbers of a state and from parameters; None if they
+    /// depend on a step or a time. Where they depend on samples, events alone take them.
     fn evaluation(&self, of: Vec<PyRef<'_, Symbol>>, states: usize) -> PyResult<Option<Evaluation>> {
         let (tape, roots) = self.with(&of)?;
         let of = match tape.precision() {
