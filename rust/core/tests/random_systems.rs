@@ -170,7 +170,7 @@ struct StepStrategy {
 }
 
 impl Case {
-    /// What is stepped, of the members of a range.
+    /// The model of the members in a range.
     fn model(&self, method: &str, of: &std::ops::Range<usize>) -> Model<'_> {
         let rows = self.parameters.iter().map(|row| if row.len() == 1 { Row(&row[..]) } else { Row(&row[of.clone()]) });
         let rows: Vec<Row> = rows.collect();

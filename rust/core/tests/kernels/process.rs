@@ -1,4 +1,4 @@
-//! What a kernel does to the process: pages, and where they are not to be had.
+//! The effects of a kernel on the process: pages, and where they are not to be had.
 
 #![allow(unsafe_code, reason = "asks the system for what a test needs")]
 
@@ -145,7 +145,7 @@ fn a_child_process_runs_the_kernels_of_its_parent() {
     }
 }
 
-/// What Windows is asked.
+/// Questions to Windows.
 #[cfg(windows)]
 mod windows {
     use std::ffi::c_void;
