@@ -421,7 +421,7 @@ pub(crate) const LOGARITHMIC: u8 = 0;
 pub(crate) const NEWTON: u8 = 1;
 const PRINTED: u8 = 2;
 
-/// Which kernel meets the bodies: chosen once, called for each force.
+/// The kernel that meets the bodies: chosen once, called for each force.
 #[derive(Clone, Copy, Debug)]
 pub struct Kernel {
     /// The force.
@@ -438,13 +438,13 @@ pub struct Kernel {
 pub struct Meeting<'a> {
     /// How many bodies.
     pub n: usize,
-    /// At which distances.
+    /// The distances at which they meet.
     pub groups: &'a [Distances],
-    /// Where they are.
+    /// The places of the bodies.
     pub round: &'a Round,
-    /// Room for what they collect.
+    /// Buffers for the sums of each body.
     pub sums: &'a mut Sums,
-    /// Whether to add to what is there.
+    /// Whether to add to these sums, or to replace them.
     pub more: bool,
     /// When set, the kernel returns early with unfinished sums.
     pub stop: &'a AtomicBool,

@@ -42,7 +42,7 @@ pub enum Level {
 
 /// A hot loop. `run` must be `#[inline(always)]`, all the way down, or it is compiled for the baseline.
 pub trait Task {
-    /// Does it.
+    /// Runs the loop.
     fn run(self);
 }
 

@@ -23,7 +23,7 @@ pub enum Function {
 /// The Taylor coefficients of a solution, from the first on, and the functions with several branches that its rates have.
 #[derive(Clone, Debug)]
 pub struct Series<N> {
-    /// Of each order as many as the state has numbers.
+    /// For each order as many coefficients as the state has numbers.
     pub terms: Vec<Vec<N>>,
     /// The branches that the rates are on.
     pub branches: Vec<Branch<N>>,
@@ -44,9 +44,9 @@ pub struct Branch<N> {
 /// The derivatives of rates; none where one is known to be zero.
 #[derive(Clone, Debug)]
 pub struct Derivatives<N> {
-    /// By each number of the state: one for each rate.
+    /// Derivatives by each number of the state: one for each rate.
     pub by_state: Vec<Vec<Option<N>>>,
-    /// By the time.
+    /// Derivatives by the time.
     pub by_time: Vec<Option<N>>,
 }
 

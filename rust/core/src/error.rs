@@ -125,7 +125,7 @@ pub enum Error {
     /// Arrays that do not fit together.
     #[error("{what}: expected {expected}, got {got}")]
     Shape {
-        /// Which array.
+        /// The name of the array.
         what: &'static str,
         /// How many numbers it should have.
         expected: usize,

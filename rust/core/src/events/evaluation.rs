@@ -64,8 +64,8 @@ impl<T: Real> Clone for Evaluation<T> {
 }
 
 impl<T: Cached> Evaluation<T> {
-    /// Of values that depend on `states` numbers of the state, on parameters and on samples; none if they depend on a step or a
-    /// time, which of 32 bits are the first numbers of the state, or, of 32 bits, on samples.
+    /// Compiles values that depend on `states` numbers of the state, on parameters and on samples; none if they depend on a step
+    /// or a time, which of 32 bits are the first numbers of the state, or, of 32 bits, on samples.
     pub fn new(tape: &Tape, values: &[Id], states: usize) -> Result<Option<Evaluation<T>>, Error> {
         let number = |op: &Op| if let Op::Param(i) = op { *i as usize + 1 } else { 0 };
         let parameters = tape.ops().iter().map(number).max().unwrap_or(0);
@@ -188,7 +188,7 @@ pub(crate) struct Evaluator<'a, T: Real = f64> {
     parameters: &'a [Row<'a>],
     tables: &'a [Table<'a>],
     level: Level,
-    /// For one or two members, and for many.
+    /// Tiles for one or two members, and for many.
     tiles: [Option<Filled<T>>; 2],
     /// The values of one member.
     values: Vec<f64>,

@@ -220,7 +220,7 @@ impl Bracket {
     }
 }
 
-/// Of a number above zero: by the power of two above it.
+/// The exponent of the power of two above a number above zero.
 fn exponent(x: f64) -> i32 {
     const SCALE: f64 = (1u64 << 54) as f64;
     let of_normal = |x: f64| (x.to_bits() >> 52) as i32 - 1022;

@@ -1,4 +1,4 @@
-//! Which events occur in steps: changes of sign are counted, located and kept, and members stop at them.
+//! The search for events in steps: changes of sign are counted, located and kept, and members stop at them.
 
 use std::sync::{Arc, PoisonError};
 
@@ -110,7 +110,7 @@ pub(crate) struct Watch<'a> {
     pub(super) found: Found,
     /// Steps in which something may occur.
     noticed: Vec<Noticed>,
-    /// In which the event may occur, and in which it does: they are located later, with others.
+    /// For each event, candidates to locate later, with others, and changes of sign.
     candidates: Vec<Vec<Candidate>>,
     changes: Vec<Vec<Change>>,
 }
@@ -517,7 +517,7 @@ pub struct Brackets<'c> {
     pub members: &'c [i64],
     /// Time, length, both shares and both quantities.
     pub numbers: &'c [f64],
-    /// Both states.
+    /// The states of the step's start and of the part's end.
     pub states: &'c [f64],
 }
 

@@ -31,7 +31,7 @@ pub struct SingleLanes {
     judged: PreparedStage,
     judged_rows: Aligned,
     inputs: Vec<Input>,
-    /// Of times of the run, which are negated where it goes back.
+    /// The sign of times of the run, which are negated where it goes back.
     sign: f64,
 }
 
