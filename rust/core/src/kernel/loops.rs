@@ -44,7 +44,7 @@ struct Pinned {
 /// How many values are live at once, and when each is needed last.
 struct Pressure {
     most: u32,
-    /// Of each value how often it is read.
+    /// For each value how often it is read.
     reads: Vec<u32>,
 }
 

@@ -57,23 +57,23 @@ pub(crate) trait Machine: InstructionSet {
     /// Sets the width of the vectors that follow. Called only where numbers are moved between lanes.
     fn of_width(&mut self, _width: usize) {}
 
-    /// From memory to a register.
+    /// Loads from memory to a register.
     fn load(&mut self, register: u8, from: Place);
 
-    /// From a register to memory.
+    /// Stores a register to memory.
     fn store(&mut self, register: u8, to: Place);
 
-    /// From register to register.
+    /// Copies from register to register.
     fn copy(&mut self, to: u8, from: u8);
 
-    /// The start of the function: keeps what belongs to the caller, sets how numbers are rounded, gets the pointers and the
+    /// Starts the function: keeps what belongs to the caller, sets how numbers are rounded, gets the pointers and the
     /// number of steps.
     fn enter(&mut self);
 
-    /// The end of the function.
+    /// Ends the function.
     fn leave(&mut self);
 
-    /// The number of steps and the table of the steps from the start again.
+    /// Resets the number of steps and the table of the steps to the start.
     fn rewind(&mut self);
 
     /// Moves a pointer by `bytes` bytes.

@@ -2,15 +2,15 @@
 //!
 //! Nothing here knows a CPU.
 
-/// Never, or nothing.
+/// No use, or no value.
 pub(crate) const NONE: u32 = u32::MAX;
 
-/// When each value is needed.
+/// The times at which each value is needed.
 #[derive(Debug)]
 pub(crate) struct Uses {
-    /// Of each value its next use, as a place in `uses`.
+    /// For each value its next use, as a place in `uses`.
     first: Vec<u32>,
-    /// When, and the place of the use after it.
+    /// The time of a use, and the place of the use after it.
     uses: Vec<(u32, u32)>,
 }
 
@@ -47,9 +47,9 @@ impl Uses {
 /// Registers and what they hold.
 #[derive(Debug)]
 pub(crate) struct Registers {
-    /// Of each register the value that it holds.
+    /// For each register the value that it holds.
     holds: [u32; 32],
-    /// Of each value its register.
+    /// For each value its register.
     of: Vec<u8>,
     /// A bit for each register that can be taken.
     free: u32,
@@ -124,7 +124,7 @@ impl Registers {
         self.locked |= 1 << register;
     }
 
-    /// All may be changed again.
+    /// Lets all registers be changed again.
     pub(crate) fn unlock(&mut self) {
         self.locked = 0;
     }

@@ -42,7 +42,7 @@ fn interpreted_lanes(body: &Body, members: usize) -> usize {
     members.div_ceil(turns).next_multiple_of(FEW_INTERPRETED)
 }
 
-/// Which kernel runs. Each has its own layout of the uniform numbers: see [`Kernel::pool`].
+/// The kind of the kernel. Each has its own layout of the uniform numbers: see [`Kernel::pool`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum KernelKind {
     /// The interpreter.

@@ -1,4 +1,4 @@
-//! In which order the operations of a step are written.
+//! The order in which the operations of a step are written.
 //!
 //! A CPU executes out of order, but only among the next few hundred operations. Several interleaved vectors give it enough to do.
 //! A long step leaves no registers for a second vector, and a single member has none: written function after function, such a
@@ -102,7 +102,7 @@ pub struct Waits {
 }
 
 impl Waits {
-    /// Of operations in an order in which operands come first: for each, those that make its operands, and its times.
+    /// The dependences of operations whose operands come first: for each, the operations that make its operands, and its times.
     pub fn new(operands: Vec<Vec<usize>>, time: Vec<[f64; 2]>) -> Waits {
         let mut users = vec![Vec::new(); operands.len()];
         for (i, of) in operands.iter().enumerate() {

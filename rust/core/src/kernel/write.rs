@@ -18,9 +18,9 @@ pub(crate) enum Where {
     Nowhere,
     /// As its source says.
     Leaf,
-    /// In the scratch.
+    /// A slot of the scratch.
     Slot(u32),
-    /// In the row of a number of the state, which it has replaced.
+    /// The row of a number of the state, which it has replaced.
     State(u32),
 }
 
@@ -46,11 +46,11 @@ pub(crate) struct Writer<'a, M: MakeOperation> {
     pub registers: Registers,
     pub uses: Uses,
     pub memory: Vec<Where>,
-    /// Which number of the state a value of the plan replaces.
+    /// The number of the state that each value of the plan replaces.
     pub replaces: Vec<Option<u32>>,
-    /// Of each number of the state in each vector of the block its register, if it has one.
+    /// For each number of the state in each vector of the block its register, if it has one.
     pub homes: Vec<Option<u8>>,
-    /// Of the same, whether the next value waits for the old one to be read.
+    /// For the same, whether the next value waits for the old one to be read.
     pub waits: Vec<bool>,
     /// The current time: twice the index in the order.
     pub now: u32,

@@ -1,4 +1,4 @@
-//! From a body to machine code, for any CPU, and to a kernel, for this one.
+//! The steps from a body to machine code, for any CPU, and to a kernel, for this one.
 
 use super::{
     Kernel, Tile, aarch64,

@@ -20,7 +20,7 @@ pub(crate) struct Packs {
     pub ops: Vec<Op>,
     /// Two to four operations each.
     pub packs: Vec<Vec<Id>>,
-    /// Of each operation its vector.
+    /// For each operation its vector.
     pub of: Vec<Option<u32>>,
 }
 
@@ -62,7 +62,7 @@ struct Finder {
     height: Vec<u32>,
     /// Equal for operations of the same form, down to the leaves.
     form: Vec<u64>,
-    /// Of each operation those that it is an operand of, in order.
+    /// For each operation those that it is an operand of, in order.
     users: Vec<Vec<Id>>,
     /// Vectors whose operands and users were not looked at.
     queue: VecDeque<u32>,

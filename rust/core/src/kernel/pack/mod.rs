@@ -22,7 +22,7 @@ use crate::tape::split::Body;
 
 /// A packing must save this share of the cycles of a step: the model is not exact.
 const LEAST_GAIN: f64 = 0.04;
-/// Steps of fewer operations are not looked at.
+/// Steps of fewer operations are not packed.
 const FEWEST_OPERATIONS: usize = 8;
 /// In longer steps less is tried, so that it does not take long, and nothing is made a second time: there are enough operations
 /// that do not wait for what is moved.
@@ -40,11 +40,11 @@ const TRIALS: [(usize, usize); 6] = [(1, 4), (2, 4), (3, 4), (4, 4), (1, 2), (2,
 /// The effect of packing on a step, and the reason to pack or not: cycles of a step by the model.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Verdict {
-    /// Number by number.
+    /// Cycles number by number.
     pub single: f64,
-    /// With the best packing; None if none was found.
+    /// Cycles with the best packing; None if none was found.
     pub packed: Option<f64>,
-    /// Of an operation waiting for another, if there were units for all: no packing is faster.
+    /// Cycles of the longest chain of operations, if there were units for all: no packing is faster.
     pub chain: f64,
     /// Operations of a step.
     pub operations: usize,
