@@ -80,7 +80,7 @@ pub trait Rates: Send + Sync {
         }
     }
 
-    /// Both of one state.
+    /// Both rates of one state.
     fn both(&mut self, t: f64, v: &[f64], y: &[f64], [dv, dy]: [&mut [f64]; 2]) {
         self.dv(t, v, y, dv);
         self.dy(t, v, y, dy);

@@ -159,11 +159,11 @@ fn runs(mut numbers: Vec<usize>) -> Vec<Range<usize>> {
 struct Matrix {
     lanes: usize,
     unknowns: usize,
-    /// All entries, by rows; of each a number for each member.
+    /// The entries, by rows; of each a number for each member.
     entries: Aligned,
     /// The reciprocals of those on the diagonal.
     over: Vec<f64>,
-    /// Of each exchange whether it was made, and the multiple of the row that the other lost.
+    /// For each exchange whether it was made, and the multiple of the row that the other lost.
     exchanged: Vec<bool>,
     factors: Vec<f64>,
 }

@@ -25,7 +25,7 @@ pub(crate) struct Implicit<N: Number> {
 }
 
 impl<N: Number> Implicit<N> {
-    /// Of a system at a state; None of numbers, whose derivatives are not known.
+    /// Derives the rates of a system at a state; None for plain numbers, whose derivatives are not known.
     pub(crate) fn new(s: &dyn System<N>, t: N, h: N, v: &DVector<N>, y: &DVector<N>) -> Option<Implicit<N>> {
         let state: Vec<N> = v.iter().chain(y).copied().collect();
         let mut rates = || s.dv(t, v, y).iter().chain(&s.dy(t, v, y)).copied().collect();

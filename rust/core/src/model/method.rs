@@ -81,24 +81,24 @@ pub struct Estimate {
 /// A fact about a method, to be shown.
 #[derive(Debug)]
 pub enum Fact {
-    /// Words.
+    /// A text.
     Text(&'static str),
-    /// Words that may not be there.
+    /// A text that may be missing.
     MaybeText(Option<&'static str>),
-    /// Several of them.
+    /// Several texts.
     Texts(&'static [&'static str]),
-    /// A whole number that may not be there.
+    /// A whole number that may be missing.
     Whole(Option<usize>),
     /// A number.
     Number(f64),
-    /// Several of them.
+    /// Several numbers.
     Numbers(Vec<f64>),
     /// Yes or no.
     Truth(bool),
 }
 
 impl Record {
-    /// All metadata, by their names in Python. Those that follow from the step itself are read from its program.
+    /// All metadata, by their names in Python. Some follow from the step itself and are read from its program.
     pub fn facts(&self) -> Vec<(&'static str, Fact)> {
         let program = self.program();
         vec![

@@ -29,7 +29,7 @@ pub struct Method {
     attempt: Option<Program>,
     /// The coefficients of its continuous extension: results are those of v and of y, power by power.
     extension: Option<Program>,
-    /// Of each way to start the program that turns a velocity into what the v slot holds between steps, with the blocks that are
+    /// For each way to start the program that turns a velocity into what the v slot holds between steps, with the blocks that are
     /// kept behind it.
     starts: Vec<Program>,
     /// The inverses, which turn what the v slot holds into a velocity; none where it holds v.
@@ -55,8 +55,8 @@ impl From<&Record> for Method {
 }
 
 impl Method {
-    /// One that a user defines by its programs: a step, an attempt with the order of its estimate, and what makes the blocks that
-    /// are kept.
+    /// A method that a user defines by its programs: a step, an attempt with the order of its estimate, and the start of the
+    /// blocks that it keeps.
     pub fn own(
         name: &str,
         needs: Needs,

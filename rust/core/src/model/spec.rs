@@ -154,7 +154,7 @@ impl Signature {
     }
 }
 
-/// Which system, with which parameters.
+/// A system with its parameters and inputs.
 #[derive(Clone, Debug, Default)]
 pub struct Spec<'a> {
     /// Names and counts.

@@ -60,11 +60,11 @@ fn belongs(signature: &Signature, first: usize, table: usize, part: &str) -> boo
 /// How a table is looked up.
 #[derive(Clone, Copy, PartialEq)]
 enum Lookup {
-    /// At a time.
+    /// The sample at a time.
     AtTime,
-    /// By its mean, at times as they are.
+    /// The mean over the window, at times as they are.
     Mean,
-    /// By its mean, at times that count from one of each member, which is in the table behind that of times.
+    /// The mean, at times that count from one of each member, which is in the table behind that of times.
     MeanSince,
 }
 

@@ -94,7 +94,7 @@ pub(super) struct Record<'a> {
     pub(super) level: Level,
     pub(super) h: f64,
     pub(super) what: &'a [Quantity],
-    /// Of each body with mass: the mass, ½·h·m, and h times the potential at these places.
+    /// For each body with mass: the mass, ½·h·m, and h times the potential at these places.
     pub(super) mass: &'a [f64],
     pub(super) half: &'a [f64],
     pub(super) potential: &'a [f64],

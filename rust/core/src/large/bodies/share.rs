@@ -24,7 +24,7 @@ pub(super) fn add(to: &mut [f64], from: &[f64], more: bool) {
     }
 }
 
-/// Every slab into its share, on as many threads as there are sums.
+/// Computes every slab into its share, on as many threads as there are sums.
 pub(super) fn share(
     slabs: &[Vec<Distances>],
     shares: &mut [Share],
@@ -57,7 +57,7 @@ pub(super) fn share(
     }
 }
 
-/// Some bodies without mass.
+/// A part of the bodies without mass.
 struct Part<'a> {
     bodies: &'a [u32],
     /// The forces on the bodies from number `first` on.

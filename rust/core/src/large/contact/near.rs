@@ -1,4 +1,4 @@
-//! Which points may have met a surface: a test of many side by side, which may name too many points but never too few.
+//! The points that may have met a surface: a test of many side by side, which may name too many points but never too few.
 
 #![allow(clippy::needless_range_loop, reason = "loops over lanes are written as the instructions that they become")]
 

@@ -155,7 +155,7 @@ impl<N: Number> Links<N> {
         Links::of(dim, ends(p.signature), masses, p.numbers("lengths").to_vec(), p.numbers("anchors").to_vec())
     }
 
-    /// From the dimensions, the ends of each rod, the points' masses, the rods' lengths and the anchors.
+    /// Rods from the dimensions, the ends of each rod, the points' masses, the rods' lengths and the anchors.
     pub(crate) fn of(dim: usize, ends: Vec<[usize; 2]>, masses: Vec<N>, lengths: Vec<N>, anchors: Vec<N>) -> Self {
         let (inverse, minus) = [1.0, -1.0].map(|one| masses.iter().map(|m| N::of(one) / *m).collect()).into();
         Links { dim, ends, masses, inverse, minus, lengths, anchors }

@@ -155,7 +155,7 @@ impl<N: Number> Springs<N> {
         &self.fall
     }
 
-    /// From the one end of a spring to the other.
+    /// The vector from the one end of a spring to the other.
     fn across(&self, s: usize, places: &[N]) -> Vec<N> {
         let [i, j] = self.ends[s].map(|particle| self.dim * particle);
         (0..self.dim).map(|c| places[j + c] - places[i + c]).collect()

@@ -20,7 +20,7 @@ pub(crate) struct Step<N: Number> {
 }
 
 impl<N: Number> Step<N> {
-    /// From the states before and after.
+    /// The step between the states before and after.
     pub(crate) fn new(h: N, [v0, y0]: [&[N]; 2], [v1, y1]: [&[N]; 2]) -> Step<N> {
         let lag = (0..y0.len()).map(|i| (y1[i] - y0[i]) / h - N::of(0.5) * (v0[i] + v1[i])).collect();
         let kick = difference(v1, v0);

@@ -111,7 +111,7 @@ pub struct Contacts<N: Number> {
     dim: usize,
     fixed: Vec<u32>,
     surfaces: Vec<Surface<N>>,
-    /// If the points are joined by rods.
+    /// The rods, if they join the points.
     rods: Option<RodContacts<N>>,
     /// Whether the energy is compared: along one plane without friction it is right by itself.
     is_limited: bool,
@@ -158,7 +158,7 @@ impl<N: Number> Contacts<N> {
         !is_among(&self.fixed, point)
     }
 
-    /// Which points met a surface in a step, None for those that no surface acts on, and the state after that.
+    /// The points that met a surface in a step, None for those that no surface acts on, and the state after that.
     fn resolve(&self, before: [&Block<N>; 2], [mut v, mut y]: [Block<N>; 2]) -> (Vec<Option<N::Truth>>, [Block<N>; 2]) {
         let mut touched = vec![None; y.len() / self.dim];
         if self.are_joined() {

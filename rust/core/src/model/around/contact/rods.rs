@@ -54,7 +54,7 @@ struct Contact<'a, N: Number> {
     aim: N,
     /// The distance below which it is not left.
     low: N,
-    /// By a unit impulse along the normal.
+    /// The change of all velocities by a unit impulse along the normal.
     column: Column<N>,
     /// The velocity of the point itself along the normal by that impulse, infinite where there is no contact.
     give: N,
@@ -138,7 +138,7 @@ impl<N: Number> RodContacts<N> {
         &block[i * self.links.dim..][..self.links.dim]
     }
 
-    /// Each point with each surface.
+    /// The contacts of each point with each surface.
     fn contacts<'a>(
         &self,
         surfaces: &'a [Surface<N>],
@@ -285,7 +285,7 @@ fn visit<N: Number>(each: &Contact<N>, give: N, impulse: &mut N, v: &mut [N]) {
     *impulse += more;
 }
 
-/// All impulses, and the velocities after them, in place.
+/// Finds all impulses, and sets the velocities after them.
 fn strike<N: Number>(contacts: &[Contact<N>], v: &mut [N]) -> Impulses<N> {
     let (zero, one) = (N::of(0.0), N::of(1.0));
     let shear = contacts.iter().map(|each| vec![zero; each.tangents.len()]).collect();
