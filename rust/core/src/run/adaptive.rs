@@ -270,7 +270,7 @@ impl<'a> Worker<'a> {
         most.min(self.attempts_to_next_kept(assignments))
     }
 
-    /// After how many attempts a member may have made a step that is kept.
+    /// Attempts after which a member may have made a step that is kept.
     fn attempts_to_next_kept(&self, assignments: &[Option<Assignment>]) -> usize {
         let every = self.plan.every;
         if every == 0 {
@@ -305,7 +305,7 @@ impl<'a> Worker<'a> {
         assigned.accepted_steps == part.steps[0].rows()
     }
 
-    /// Attempts of all members one by one, keeping where they stand before the first and after each.
+    /// Makes attempts of all members one by one, keeping where they stand before the first and after each.
     fn attempt_log(&mut self, mut part: Part, go_on: GoOn) -> Result<(), Error> {
         let (lanes, rows) = (self.group.lanes(), self.plan.at.len());
         let of_time = self.plan.v.len() + self.plan.y.len() + Pace::<f64>::PLACES[0];
@@ -576,7 +576,7 @@ impl<'a> Worker<'a> {
         Ok(None)
     }
 
-    /// Of a step that is held and whose coefficients are known: saves the state at the next time within it, or takes it.
+    /// In a held step with known coefficients, saves the state at the next time within it, or takes the step.
     fn go_by_terms(&mut self, part: &mut Part, lane: usize, assigned: &mut Assignment, mut pace: Pace<f64>) {
         let (spec, member) = (&self.plan.model.spec, part.first + assigned.member);
         if !pace.holds() {
@@ -603,9 +603,8 @@ impl<'a> Worker<'a> {
         self.group.set_state(lane, &origin);
     }
 
-    /// Of a lane at the start of a held step: saves the state of the extra step that it has made, and sets the next one, or lets
-    /// the held step be taken. Does what [`Self::update_lane`] does, and moves nothing else. Returns false where that has more to
-    /// do.
+    /// At the start of a lane's held step, saves the state of the extra step that it has made, and sets the next one, or lets the
+    /// held step be taken. Does what [`Self::update_lane`] does, and moves nothing else. Returns false where that has more to do.
     fn go_within(&mut self, part: &mut Part, lane: usize, assigned: &mut Assignment) -> bool {
         let (p, n, made) = (self.plan.v.len(), self.plan.v.len() + self.plan.y.len(), assigned.origin.is_some());
         let Pace { t, h, target: until, extra, held, wall, rejected, .. } = self.places;

@@ -50,7 +50,7 @@ pub struct AdaptiveRun<'a> {
 pub(super) enum Status {
     /// Its rows of [`Arrays::steps`] are full.
     Full = -1,
-    /// At the last time.
+    /// It came to the last time.
     Ok = 0,
     /// Out of attempts.
     Budget = 2,
@@ -69,7 +69,7 @@ pub struct Arrays<'a> {
     pub saved_y: &'a mut [f64],
     /// Rows of the members' states at the end, v and y: those before the step that contains the last output time.
     pub state: &'a mut [f64],
-    /// Their paces at the end, by rows.
+    /// The members' paces at the end, by rows.
     pub paces: &'a mut [f64],
     /// One row: the status.
     pub status: &'a mut [i64],
@@ -146,7 +146,7 @@ impl<'a> Arrays<'a> {
     }
 }
 
-/// Which member of the part a lane steps, and which of the saved times is next.
+/// The member of the part that a lane steps, and the next of the saved times.
 pub(super) struct Assignment {
     pub(super) member: usize,
     pub(super) next: usize,
@@ -155,19 +155,19 @@ pub(super) struct Assignment {
     pub(super) origin: Option<(Vec<f64>, f64)>,
     /// A run that goes on is held, and the coefficients of its series have to be found first.
     pub(super) held_before: bool,
-    /// How many accepted steps it had when a step was looked at last, and how many are kept of this run.
+    /// How many accepted steps it had at the last check of a step, and how many are kept of this run.
     pub(super) accepted: f64,
     pub(super) accepted_steps: usize,
-    /// How many accepted steps it had when a waypoint was looked for last.
+    /// How many accepted steps it had at the last check for a waypoint.
     pub(super) passed: u64,
-    /// States within the step that comes next, or is held, are made by steps.
+    /// Whether states within the step that comes next, or is held, are made by steps.
     pub(super) by_steps: bool,
     /// Where an event stops it.
     pub(super) stop: Option<Stop>,
 }
 
 impl Assignment {
-    /// Of a member of the log of attempts.
+    /// The assignment of a member in the log of attempts.
     pub(super) fn of_log(member: usize, next: usize) -> Assignment {
         Assignment {
             member,

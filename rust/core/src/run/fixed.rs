@@ -257,7 +257,7 @@ struct Worker<'a, T: Real> {
     plan: &'a FixedRun<'a>,
     traced: &'a Arc<Traced>,
     machine: Machine,
-    /// For as many members as there are, and for those that fill no group of these, with their number.
+    /// Groups of as many members as fit, and for the rest that fills no such group, with its number of members.
     full: Option<Box<dyn Group<T>>>,
     rest: Option<(usize, Box<dyn Group<T>>)>,
     good: Good<T>,

@@ -26,8 +26,8 @@ struct Share<T> {
     group: Box<dyn Group<T>>,
     first: usize,
     count: usize,
-    /// Both slots, and what the method keeps, before the step that is being made, if that can be stopped, and before the one that
-    /// was made last.
+    /// The slots, and the blocks that the method keeps, before the step that is being made, if that can be stopped, and before
+    /// the last one.
     before: [Vec<T>; 2],
 }
 
@@ -47,7 +47,7 @@ impl<T: Real> Share<T> {
     }
 }
 
-/// Everything that a step needs, made once; a step allocates nothing and checks nothing.
+/// A prepared loop: a step allocates nothing and checks nothing.
 pub struct World<T = f64> {
     clock: Clock,
     shares: Vec<Share<T>>,
@@ -55,9 +55,9 @@ pub struct World<T = f64> {
     sizes: (usize, usize),
     /// Whether the method has a carry, or keeps blocks beside the state.
     carries: bool,
-    /// How many numbers all members have that it keeps, and that a sampled controller remembers.
+    /// Numbers of all members that the method keeps, and that a sampled controller remembers.
     kept: usize,
-    /// How many of a member the controller remembers.
+    /// Numbers per member that the controller remembers.
     memory: usize,
     /// The arrays as last written, if the method has a carry: if they differ now, the caller changed the state.
     written: (Vec<T>, Vec<T>),
@@ -74,11 +74,11 @@ pub struct World<T = f64> {
 /// The steps of a run.
 #[derive(Clone, Copy, Debug)]
 pub struct RunSteps {
-    /// Number of the first.
+    /// Number of the first step.
     pub first: i64,
-    /// How many.
+    /// Number of steps.
     pub steps: i64,
-    /// After how many a state is saved, and at the start; the last alone if none.
+    /// Steps after which a state is saved, and at the start; the last alone if none.
     pub every: Option<i64>,
 }
 

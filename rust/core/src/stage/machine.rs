@@ -10,7 +10,7 @@ use crate::isa::Level;
 /// The instruction set and threads of hot loops.
 #[derive(Clone, Copy, Debug)]
 pub struct Machine {
-    /// Which kernels.
+    /// The instruction set.
     pub level: Level,
     /// How many threads the forces of one large system may use; zero for as many as there are.
     pub threads: usize,

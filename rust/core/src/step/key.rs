@@ -15,7 +15,7 @@ pub enum StepKind {
     Method {
         /// The method's name.
         name: String,
-        /// Which of its ways to start.
+        /// The number of its way to start.
         choice: usize,
     },
     /// Attempts at adaptive steps by a method.

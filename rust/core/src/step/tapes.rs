@@ -58,14 +58,14 @@ pub struct Tapes<T: Real = f64> {
     pub record: Option<Stage<T>>,
     /// Operations of a step before equal ones were merged, but for those that a method does to blocks.
     pub written: Counts,
-    /// To how many evaluations of the rates a step with a series is equal, by the operations; 0 without one.
+    /// The cost of a step with a series, in evaluations of the rates, by the operations; 0 without one.
     pub series_evaluations: usize,
 }
 
 /// The properties and tapes of a step. Expensive ones are found on first use.
 pub struct Traced {
     key: TapeKey,
-    /// Its number among all that were found in this process: no two have the same.
+    /// Its number among all of this process: no two have the same.
     pub number: u64,
     /// How large the blocks are.
     pub shape: Shape,

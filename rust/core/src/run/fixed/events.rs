@@ -33,9 +33,9 @@ const FEWER_AGAIN: usize = 2;
 /// The quantities of a group while it is stepped.
 pub struct Looks<'w, 'a> {
     watch: &'w mut Watch<'a>,
-    /// Of each event.
+    /// The tile of each event.
     tiles: Vec<Filled>,
-    /// Its quantity at the state, and one step before; NaN where that is not known.
+    /// The quantity of each event at the state, and one step before; NaN where that is not known.
     now: Vec<Vec<f64>>,
     before: Vec<Vec<f64>>,
     /// The states before each of some steps and after the last, v before y, in rows of lanes.
@@ -66,7 +66,7 @@ pub struct Between {
     members: usize,
     /// v and y at the end of the last call, by rows.
     left: [Vec<f64>; 2],
-    /// Of each event each member's quantity one step before; NaN where that is not known.
+    /// For each event each member's quantity one step before; NaN where that is not known.
     before: Vec<Vec<f64>>,
     /// If events change states: the search state of each member, by groups, and the states of those at rest.
     memories: Vec<Vec<Memory>>,
@@ -74,7 +74,7 @@ pub struct Between {
 }
 
 impl Between {
-    /// Which members of a group the caller moved since the last call, whose states are in these rows.
+    /// Whether the caller moved each member of a group since the last call; the members' states are in these rows.
     fn moved(&self, state: [&[f64]; 2], members: Range<usize>) -> Vec<bool> {
         let mut moved = vec![false; members.len()];
         for (now, left) in state.iter().zip(&self.left) {
