@@ -120,7 +120,7 @@ fn oscillator(method: &str) -> Model<'static> {
     oscillators(PER_MEMBER.0, method)
 }
 
-/// With samples of their own.
+/// An oscillator, with samples of each member's own.
 fn held(method: &str) -> Model<'static> {
     let tables = vec![("x", Table { samples: vec![PER_MEMBER; 5], start: 0.0, interval: 0.1 })];
     let (words, rows) = ([("form", "canonical")], [("omega", vec![PER_MEMBER])]);

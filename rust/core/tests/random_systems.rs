@@ -52,7 +52,7 @@ impl Random {
 struct Case {
     equations: Arc<Equations>,
     watched: Option<Arc<Equations>>,
-    /// Of each parameter one number, or one for each member.
+    /// For each parameter one number, or one for each member.
     parameters: Vec<Vec<f64>>,
     v: Vec<f64>,
     y: Vec<f64>,

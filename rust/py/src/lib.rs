@@ -453,7 +453,7 @@ fn operations(py: Python<'_>, model: &ModelSpec) -> PyResult<usize> {
     Ok(traced.operations.1)
 }
 
-/// To how many function evaluations a step with a series is equal: see `_core.pyi`.
+/// The cost of a step with a series, in function evaluations: see `_core.pyi`.
 #[pyfunction]
 #[pyo3(signature = (model, *, attempts=false))]
 fn series_evaluations(py: Python<'_>, model: &ModelSpec, attempts: bool) -> PyResult<usize> {

@@ -33,7 +33,7 @@ use crate::{
     world::machine,
 };
 
-/// Of each operation its name, how many operands it has, among which counts it is, and whether these may be exchanged.
+/// For each operation its name, how many operands it has, among which counts it is, and whether these may be exchanged.
 #[pyfunction]
 pub(crate) fn tape_operations() -> Vec<(&'static str, usize, &'static str, bool)> {
     OPERATIONS.to_vec()
@@ -276,7 +276,7 @@ impl Symbol {
 #[pyclass(module = "stepwell._core", frozen)]
 pub struct Evaluation(pub(crate) Values);
 
-/// Of 64 bits, or of 32.
+/// Values of 64 bits, or of 32.
 #[derive(Clone)]
 pub(crate) enum Values {
     Double(evaluation::Evaluation),
@@ -293,7 +293,7 @@ impl Evaluation {
     }
 }
 
-/// One number for all members, or one for each.
+/// A number for all members, or one for each.
 #[derive(FromPyObject)]
 enum Numbers<'py> {
     Common(f64),
@@ -344,7 +344,7 @@ impl Evaluation {
 
 #[pymethods]
 impl Tape {
-    /// For numbers of 64 bits, or of 32.
+    /// A tape for numbers of 64 bits, or of 32.
     #[new]
     #[pyo3(signature = (*, single=false))]
     fn new(single: bool) -> Tape {

@@ -194,7 +194,7 @@ impl Equations {
         self.kept.is_some()
     }
 
-    /// All values that are needed.
+    /// All values that the equations need.
     fn roots(&self) -> impl Iterator<Item = Id> {
         let kept = self.kept.iter().flat_map(|kept| kept.along_v.iter().chain(&kept.along_y).chain([&kept.value, &kept.square]));
         let friction = self.friction.iter().flat_map(Friction::values);

@@ -33,7 +33,7 @@ struct Rewriting<'a> {
     tape: &'a Tape,
     uses: UseCounts,
     made: Tape,
-    /// Of each value of the old tape what it is on the new one.
+    /// For each value of the old tape what it is on the new one.
     values: Vec<Value>,
 }
 
@@ -92,7 +92,7 @@ impl Rewriting<'_> {
         }
     }
 
-    /// Of a product what is known before the step, and what is of the state.
+    /// The factors of a product: the one known before the step, and the one of the state.
     fn weighted(&self, a: Id, b: Id) -> Option<(Id, Id)> {
         match (self.tape.is_of_state(a), self.tape.is_of_state(b)) {
             (false, true) => Some((a, b)),

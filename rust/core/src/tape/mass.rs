@@ -11,7 +11,7 @@ use super::number::Number;
 pub struct Mass(Vec<Vec<(u32, u64)>>);
 
 impl Mass {
-    /// Of the rows with the columns and entries of each.
+    /// A matrix from its rows, with the columns and entries of each.
     pub fn new(rows: &[Vec<(u32, f64)>]) -> Mass {
         Mass(rows.iter().map(|row| row.iter().map(|(column, entry)| (*column, entry.to_bits())).collect()).collect())
     }

@@ -14,7 +14,7 @@ macro_rules! operations {
             $($(#[$doc])* $op $(($($type),*))?,)*
         }
 
-        /// Of each operation its name, how many operands it has, among which counts it is, and whether they may be exchanged.
+        /// For each operation its name, how many operands it has, among which counts it is, and whether they may be exchanged.
         pub const OPERATIONS: &[(&str, usize, &str, bool)] =
             &[$(($name, <[&str]>::len(&[$(stringify!($operand)),*]), stringify!($counted), commutes!($($commutes)?))),*];
 
@@ -141,7 +141,7 @@ operations! {
     LessEqual(a: Id, b: Id), [a, b], 0u32, "at most", "%{a} <= %{b}", choices;
     /// a = b
     Equal(a: Id, b: Id), [a, b], 0u32, "equal", "%{a} = %{b}", choices, commutes;
-    /// Of bits: where the first is set the second, else the third. A mask comes from a comparison.
+    /// Bits: where the first is set those of the second, else of the third. A mask comes from a comparison.
     Select(m: Id, a: Id, b: Id), [m, a, b], 0u32, "choose", "%{m} ? %{a} : %{b}", choices;
     /// Bits of both.
     And(a: Id, b: Id), [a, b], 0u32, "and", "%{a} and %{b}", bits, commutes;
@@ -234,7 +234,7 @@ pub struct Counts {
 }
 
 impl Counts {
-    /// All of them.
+    /// The sum of all counts.
     pub(crate) fn total(&self) -> usize {
         let kinds =
             [self.additions, self.multiplications, self.fused, self.divisions, self.square_roots, self.choices, self.bits];

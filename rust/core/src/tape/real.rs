@@ -88,9 +88,9 @@ fn widened(bits: u64) -> f64 {
     f32::from_bits(bits as u32).into()
 }
 
-/// A number of one of them.
+/// A number of one of these precisions.
 pub trait Real: Copy + Debug + Default + PartialEq + PartialOrd + Send + Sync + 'static {
-    /// Which.
+    /// The precision.
     const PRECISION: Precision;
     /// Where the numbers of a method's carry are larger than this, or than this times the step if that is less than 1, velocities
     /// are checked after every step: see [`crate::run::fixed`].
@@ -100,11 +100,11 @@ pub trait Real: Copy + Debug + Default + PartialEq + PartialOrd + Send + Sync + 
     /// Beyond all numbers.
     const INFINITY: Self;
 
-    /// Rounded to it.
+    /// Rounds a number to this precision.
     fn of(x: f64) -> Self;
-    /// As one of 64 bits, which is exact.
+    /// Widens the number to 64 bits, which is exact.
     fn wide(self) -> f64;
-    /// Of its bits, the lowest ones.
+    /// The number with the lowest of these bits.
     fn from_pattern(bits: u64) -> Self;
     /// Its bits; those above are zero.
     fn pattern(self) -> u64;

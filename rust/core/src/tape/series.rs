@@ -161,7 +161,7 @@ struct Series {
     terms: HashMap<Id, Vec<Term>>,
     /// The values that change with time and are not the state or the time, each after those that its operation reads.
     values: Vec<Id>,
-    /// Of some of them the derivatives by others.
+    /// Derivatives of some of these values by others.
     factors: HashMap<Id, Vec<(Symbol, Symbol)>>,
     /// Bounds of those that are one branch of several.
     bounds: HashMap<Id, [f64; 2]>,
@@ -176,7 +176,7 @@ struct Series {
 }
 
 impl Series {
-    /// Of values that change with the state and the time; `fixed` does not, whatever it was made of.
+    /// A series of values that change with the state and the time; `fixed` does not, whatever it was made of.
     fn new(start: &[Symbol], time: Symbol, fixed: Option<Symbol>, rates: &[Symbol]) -> Series {
         let mut terms: HashMap<Id, Vec<Term>> = start.iter().chain([&time]).map(|seed| (seed.0, vec![Some(*seed)])).collect();
         let (mut factors, mut bounds) = (HashMap::new(), HashMap::new());
@@ -341,7 +341,7 @@ impl Series {
         sum(sum(sum(totals.0, totals.1), middle), sum(of_a(0), of_b(0))) // which does not depend on which of both is a
     }
 
-    /// Of y = f(a, b, …), from ẏ = f₁·ȧ + f₂·ḃ + …: k·yₖ = Σ j·aⱼ·f₁ₖ₋ⱼ + ….
+    /// The k-th coefficient of y = f(a, b, …), from ẏ = f₁·ȧ + f₂·ḃ + …: k·yₖ = Σ j·aⱼ·f₁ₖ₋ⱼ + ….
     fn of_function(&self, factors: &[(Symbol, Symbol)], k: usize) -> Term {
         let mut total = None;
         for (argument, factor) in factors {

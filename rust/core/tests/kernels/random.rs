@@ -87,9 +87,9 @@ pub(crate) fn in_single(body: Body) -> Body {
 struct Maker<'a> {
     random: &'a mut Random,
     ops: Vec<Op>,
-    /// Of each value whether its bits are promised: it cannot be a NaN that arithmetic made.
+    /// For each value whether its bits are promised: it cannot be a NaN that arithmetic made.
     sure: Vec<bool>,
-    /// Of each value whether it is a mask.
+    /// For each value whether it is a mask.
     mask: Vec<bool>,
 }
 
@@ -227,7 +227,7 @@ pub(crate) fn body(random: &mut Random, operations: usize, states: usize) -> Bod
     if random.once_in(5) { body } else { needed(body) }
 }
 
-/// Without operations whose result is not used.
+/// The body without operations whose result is not used.
 fn needed(body: Body) -> Body {
     let mut needed = vec![false; body.ops.len()];
     body.next.iter().for_each(|id| needed[*id as usize] = true);

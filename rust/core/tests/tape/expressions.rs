@@ -75,7 +75,7 @@ fn number(random: &mut Random) -> f64 {
 /// An expression as it is asked for: nothing is shortened.
 struct Asked {
     ops: Vec<Op>,
-    /// Of each value whether its bits are promised, because it cannot be a NaN that arithmetic made.
+    /// For each value whether its bits are promised, because it cannot be a NaN that arithmetic made.
     sure: Vec<bool>,
 }
 
