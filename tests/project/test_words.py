@@ -54,6 +54,14 @@ def test_docstrings_say_first_what_a_thing_is() -> None:
     assert not lines, "begin with a noun or a verb:\n" + "\n".join(lines)
 
 
+def test_comments_of_the_core_say_first_what_a_thing_is() -> None:
+    """The first line of each doc comment; that of a truth may begin with ``Whether``."""
+    begun = re.compile(r"(?:\A|\n(?! *//[/!]).*\n) *(//[/!] (?:Those|That|These|The same|What|So (?:many|much))\b.*)")
+    sources = {name: text for name, text in texts().items() if name.endswith(".rs")}
+    lines = [f"{name}: {each[1]}" for name, text in sources.items() for each in begun.finditer(text)]
+    assert not lines, "begin with a noun or a verb:\n" + "\n".join(lines)
+
+
 def test_comments_of_the_core_fit_a_line() -> None:
     """As rustfmt breaks code, and not comments, at its ``max_width``."""
     sources = {name: text for name, text in texts().items() if name.endswith(".rs")}
