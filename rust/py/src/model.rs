@@ -179,7 +179,7 @@ fn add_rows<'a>(array: &'a PyReadonlyArray2<'_, f64>, rows: &mut Vec<Row<'a>>) -
 
 #[pymethods]
 impl ModelSpec {
-    /// `given` is a list of names and what is given under them; `matrix` is the nodes of the transition-matrix form and the
+    /// `given` is a list of names and their values; `matrix` is the nodes of the transition-matrix form and the
     /// number of rows in its v slot, if it is asked for; `order` is that of a series with adaptive steps; `single` is whether
     /// steps are computed with numbers of 32 bits; `acceptance` is that of `reference/acceptance.py`, and `backward` whether
     /// adaptive steps go back in time.

@@ -71,7 +71,7 @@ impl<T: Of> ForceArray<T> {
         Ok(ForceArray::Few { buffer: PyBuffer::get(array.bind(py))?, copy: vec![T::default(); numbers] })
     }
 
-    /// Gives the world what is in the array now.
+    /// Gives the world the force in the array.
     fn read(&mut self, py: Python<'_>, world: &mut world::World<T>) -> PyResult<()> {
         match self {
             ForceArray::Few { buffer, copy } => {
@@ -131,7 +131,7 @@ impl Live {
         Ok(Live { signature: Arc::clone(&model.signature), rows, tables, arrays: live, waits: false })
     }
 
-    /// Gives the world what is in the arrays now, if it is not what was there before.
+    /// Gives the world the numbers in the arrays, if they have changed.
     fn read<T: Of>(&mut self, py: Python<'_>, world: &mut world::World<T>, changes: &AtomicI64) -> PyResult<()> {
         let Live { rows, arrays, waits, .. } = self;
         for LiveArray { name, array, now, last, place, width, bounds } in arrays {

@@ -1,4 +1,4 @@
-//! Values of a tape for many members, each from numbers of its own: what is looked at between steps.
+//! Values of a tape for many members, each from numbers of its own: the quantities that are checked between steps.
 
 use std::sync::{Arc, LazyLock};
 

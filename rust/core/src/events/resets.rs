@@ -67,7 +67,7 @@ impl Memory {
         }
     }
 
-    /// Whether its next steps are to be looked at, whatever the quantities are.
+    /// Whether its next steps must be checked, whatever the quantities are.
     pub(crate) fn is_special(&self) -> bool {
         self.rest.is_some() || self.at.iter().any(|side| *side != 0.0)
     }

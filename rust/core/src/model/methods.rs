@@ -133,7 +133,7 @@ pub fn method(name: &str) -> Result<Arc<Method>, Error> {
     Err(Error::UnknownMethod { name: name.to_owned(), known })
 }
 
-/// Makes a method known by a key; what is known by it already stays.
+/// Registers a method under a key; one that is already there stays.
 pub fn define(key: &str, method: Method) {
     let mut own = Box::new(Own { key: key.to_owned(), method: Arc::new(method), later: OnceLock::new() });
     let mut place = &OWN;

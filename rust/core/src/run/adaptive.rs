@@ -148,7 +148,7 @@ struct Worker<'a> {
     sums: Vec<[f64; SIDE]>,
     /// The times to keep the state at, if they are those of all members, and some behind them that never come.
     times: Vec<f64>,
-    /// Where events are looked for.
+    /// The event search, if there are events.
     looks: Option<Looks<'a>>,
 }
 
@@ -430,7 +430,7 @@ impl<'a> Worker<'a> {
         self.group.set_scales(lane, &scales);
         self.waypoints.expect_after(pace.accepted);
         if let Some(looks) = &mut self.looks {
-            // A held step was looked at before, up to the last time of the run that goes on.
+            // An earlier run checked a held step up to its last time.
             looks.begin(lane, at, if pace.held > 0.0 { pace.target } else { f64::NEG_INFINITY });
             let end = plan.at.last().map_or(f64::NAN, |row| row.at(at));
             looks.begin_course((lane, at), [pace.t, end], plan.begins.then_some(&state));
@@ -654,8 +654,7 @@ impl<'a> Worker<'a> {
         }
     }
 
-    /// Saves the states of a lane at times before the end of a step whose start was kept, as sums of its coefficients. Returns
-    /// how many.
+    /// Saves the states of a lane at times within a step whose start was kept, as sums of its coefficients. Returns how many.
     fn save_sums(&mut self, part: &mut Part, lane: usize, assigned: &mut Assignment, end: f64) -> usize {
         let (plan, member, first) = (self.plan, part.first + assigned.member, assigned.next);
         let mut states = std::mem::take(&mut self.sums);

@@ -150,8 +150,7 @@ impl<'a> Arrays<'a> {
 pub(super) struct Assignment {
     pub(super) member: usize,
     pub(super) next: usize,
-    /// While an extra step is made: the state that it starts from, which has to be put back, and how many attempts were rejected
-    /// before.
+    /// While an extra step is made: the state that it starts from, to be put back, and how many attempts were rejected before.
     pub(super) origin: Option<(Vec<f64>, f64)>,
     /// A run that goes on is held, and the coefficients of its series have to be found first.
     pub(super) held_before: bool,

@@ -38,8 +38,7 @@ pub struct Compiled {
     pub bytes: usize,
     /// The most values that are spilled at once because there are not enough registers.
     pub spills: usize,
-    /// Whether equal operations are lanes of one vector in a single member's machine code, and the model's verdict; none where
-    /// it was not considered.
+    /// Whether equal operations of a single member are lanes of one vector, and the model's verdict; none where not considered.
     pub packing: Option<(bool, Verdict)>,
     /// How long tracing took, with cutting, and everything that is run once in a while.
     pub trace: Duration,

@@ -235,7 +235,6 @@ pub fn run<T: Steppable>(plan: &FixedRun, arrays: Arrays<T>, monitor: &mut dyn F
 }
 
 /// State at the last check, to return to; and scratch buffers.
-/// -DEL
 #[derive(Default)]
 struct Good<T> {
     /// The slots at the last check.
@@ -335,7 +334,7 @@ struct Checks {
 /// One group's run.
 struct Job<'a, 'b, 'w, 'e, T: Real> {
     plan: &'a FixedRun<'a>,
-    /// Where events are looked for.
+    /// The event search, if there are events.
     looks: Option<Looks<'w, 'e>>,
     /// The v slot holds something else than v between steps: finish before keeping it.
     carries: bool,

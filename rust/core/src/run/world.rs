@@ -331,7 +331,7 @@ impl<T: Steppable> World<T> {
         self.step = until;
     }
 
-    /// One step. Of the rows of y the first `kept` go on, and those up to `read` are read only. `give` takes what is behind
+    /// Makes a step. Of the rows of y the first `kept` go on, and those up to `read` are read only. `give` takes the rows after
     /// these, with the number of the first member, that of members, and how long rows are.
     pub fn play(&mut self, [kept, read]: [usize; 2], y: &mut [T], mut give: impl FnMut(&[T], usize, usize, usize)) {
         let members = self.members;
@@ -448,8 +448,8 @@ impl<T: Steppable> World<T> {
 }
 
 impl World<f64> {
-    /// `n` steps with events, in place. `go_on` is asked now and then whether to; returns whether all were made. `between` is
-    /// what is known of the members since the last call.
+    /// Makes `n` steps with events, in place. `go_on` is asked now and then whether to; returns whether all were made. `between`
+    /// is the event search of the members since the last call.
     pub fn step_and_look(
         &mut self,
         n: i64,

@@ -1,7 +1,7 @@
 //! The second pass of [`super::fuse::fuse`]: increments are not rounded before they are added.
 //!
 //! Methods compute with increments, a factor that depends on the step h times something of the state: h·v̇. Here an increment is
-//! kept as c·factor·x, a number, what is known before the step, and a value:
+//! kept as c·factor·x, a number, a value known before the step, and a value:
 //!
 //! - a change of sign, a product with a number, and a product with something else that is known before the step change c and
 //!   the factor;
@@ -101,7 +101,7 @@ impl Rewriting<'_> {
         }
     }
 
-    /// p·x, where p depends on the step. What nothing else reads of x and is known before the step goes to the factor.
+    /// p·x, where p depends on the step. Factors of x that are known before the step and read by nothing else join `factor`.
     fn increment(&mut self, p: Id, mut x: Id) -> Increment {
         let mut made = Increment { c: 1.0, factor: self.plain(p), of: 0 };
         while let Op::Mul(a, b) = self.tape.op(x)
@@ -114,7 +114,7 @@ impl Rewriting<'_> {
         Increment { of: self.plain(x), ..made }
     }
 
-    /// An increment times what is known before the step.
+    /// An increment times a value that is known before the step.
     fn times(&mut self, of: Increment, p: Id) -> Increment {
         match self.tape.op(p) {
             Op::Const(bits) => Increment { c: of.c * self.tape.precision().number(bits), ..of },

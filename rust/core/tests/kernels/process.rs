@@ -174,7 +174,7 @@ mod windows {
     pub(super) fn rights() -> Vec<u32> {
         const COMMITTED: u32 = 0x1000;
         let (mut at, mut region, mut rights) = (0, Region::default(), Vec::new());
-        // SAFETY: it writes the region, which is as long as it is told.
+        // SAFETY: it writes the region, whose length it is given.
         while unsafe { VirtualQuery(at, &raw mut region, size_of::<Region>()) } != 0 {
             rights.extend((region.state == COMMITTED).then_some(region.rights));
             at = region.start + region.size;

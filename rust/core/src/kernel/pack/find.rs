@@ -64,7 +64,7 @@ struct Finder {
     form: Vec<u64>,
     /// For each operation those that it is an operand of, in order.
     users: Vec<Vec<Id>>,
-    /// Vectors whose operands and users were not looked at.
+    /// Vectors whose operands and users were not searched yet.
     queue: VecDeque<u32>,
 }
 

@@ -61,8 +61,8 @@ impl Verdict {
     }
 }
 
-/// The best packing of a body and what the model says of it. None for the packing if no operations are alike or the step is a
-/// chain already; None at all if the step is too short or too long to be looked at.
+/// The best packing of a body and the model's verdict. None for the packing if no operations are alike or the step is a
+/// chain already; None at all if the step is too short or too long to be packed.
 pub fn best(body: &Body) -> Option<(Verdict, Option<Packed>)> {
     let operations = body.work();
     if !(FEWEST_OPERATIONS..=MOST_OPERATIONS).contains(&operations) {

@@ -104,7 +104,7 @@ fn turned<N: Number>(q: &Block<N>) -> ([Vector<N>; 3], N) {
     ([x, y, z], square(q))
 }
 
-/// The sum of what is there.
+/// The sum of a vector and the total so far, if there is one.
 fn plus<N: Number>(total: Option<Vector<N>>, more: Vector<N>) -> Option<Vector<N>> {
     Some(total.map_or(more, |total| std::array::from_fn(|i| total[i] + more[i])))
 }

@@ -378,7 +378,7 @@ impl Looks<'_, '_> {
             }
             self.find_quantities(on, k, n);
             let (mut made, mut changed) = (n, Vec::new());
-            // Where nothing happens in any lane, what is known of members is brought up to date later.
+            // Where nothing happens in any lane, the members' search states are updated later.
             let (mut is_fresh, mut is_behind) = (true, false);
             for row in 0..n {
                 self.wake(on, k + row as i64, &mut changed);
@@ -431,8 +431,8 @@ impl Looks<'_, '_> {
         are_finite && !self.watch.motion.events.has_times() && !(0..self.tiles.len()).any(may)
     }
 
-    /// Brings what is known of members, but of those that are at rest or were woken, to one of the states that are kept, not the
-    /// first, before which nothing happened to them.
+    /// Updates the members' search states, but of those that are at rest or were woken, to one of the states that are kept, not
+    /// the first, before which nothing happened to them.
     fn catch_up(&mut self, row: usize, woken: &[(usize, Numbers)]) {
         for lane in 0..self.memories.len() {
             if self.memories[lane].rests() || woken.iter().any(|(other, _)| *other == lane) {

@@ -221,7 +221,7 @@ pub struct Carry<'a> {
     finish: Option<&'a Program>,
 }
 
-/// The programs by which a method goes on after a bounce.
+/// The programs that carry the velocities of this method across a bounce.
 pub fn carry(method: &Method, choice: usize) -> Carry<'_> {
     Carry { start: method.start(choice), finish: method.finish(choice) }
 }
