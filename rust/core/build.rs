@@ -21,7 +21,7 @@ fn names(folder: &Path) -> io::Result<Vec<String>> {
 }
 
 const MAKE: &str = "
-/// What makes the system of that name over any numbers: generic, so that those which only tests ask for are not in the library.
+/// Constructor of the system of this name; generic, so that those which only tests ask for are not in the library.
 pub fn make<N: equations::Operand>(name: &str) -> Option<crate::model::system::Make<N>> {
     Some(match name {
 ";

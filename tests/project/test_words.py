@@ -48,10 +48,10 @@ def test_phrases_of_our_own_do_not_come_back() -> None:
 
 
 def test_docstrings_say_first_what_a_thing_is() -> None:
-    begun = re.compile(r'"""(?:Those|That|These|The same|What|Whether)\b.*')
-    sources = {name: text for name, text in texts().items() if name.startswith("python/")}
-    lines = [f"{name}: {each[0]}" for name, text in sources.items() for each in begun.finditer(text)]
-    assert not lines, "begin with a noun or a verb:\n" + "\n".join(lines)
+    docstring = re.compile(r'"""(?:Those|That|These|The same|What|Whether)\b.*')
+    comment = re.compile(r"(?:\A|\n(?! *//[/!]).*\n) *(//[/!] (?:Those|That|These|The same|What|So (?:many|much))\b.*)")
+    begun = [(name, line) for name, text in texts().items() for line in (comment if ".rs" in name else docstring).findall(text)]
+    assert not begun, "begin with a noun or a verb:\n" + "\n".join(f"{name}: {line}" for name, line in begun)
 
 
 def test_comments_of_the_core_fit_a_line() -> None:

@@ -7,7 +7,7 @@ use std::ops::{Deref, DerefMut};
 
 const LINE: usize = 64;
 
-/// So many numbers, all zero at first.
+/// An array of numbers, initially zero, that begins at a line of the cache.
 #[derive(Debug, Default)]
 pub struct Aligned<T = f64> {
     numbers: Vec<T>,
@@ -18,14 +18,14 @@ pub struct Aligned<T = f64> {
 impl<T: Copy + Default> Aligned<T> {
     const IN_A_LINE: usize = LINE / size_of::<T>();
 
-    /// So many zeros.
+    /// An array of `count` zeros.
     pub fn new(count: usize) -> Aligned<T> {
         let numbers = vec![T::default(); count + Self::IN_A_LINE - 1];
         let first = numbers.as_ptr().align_offset(LINE).min(Self::IN_A_LINE - 1);
         Aligned { numbers, first, count }
     }
 
-    /// These numbers.
+    /// A copy of these numbers.
     pub fn from(numbers: &[T]) -> Aligned<T> {
         let mut aligned = Aligned::new(numbers.len());
         aligned.copy_from_slice(numbers);

@@ -19,9 +19,9 @@ pub enum Law {
 /// How often a product that is added is rounded.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Rounding {
-    /// Itself, and with the sum.
+    /// Twice: the product, and the sum.
     Twice,
-    /// With the sum: fused.
+    /// Once, with the sum: fused.
     Once,
 }
 
@@ -100,7 +100,7 @@ fn inverse_cube<N: Number>(x: N) -> N {
     (cube * e).mul_add(terms, cube)
 }
 
-/// From what halved bits are subtracted, of 64 and of 32 bits, and the factors of e, e² and e³ in both corrections.
+/// The minuends of halved bits, of 64 and of 32 bits, and the factors of e, e² and e³ in both corrections.
 const START: u64 = 0x5FE6_E96B_D011_219C;
 const SINGLE_START: u64 = 0x5F37_4B5F;
 const FIRST: [f64; 2] = [0.501_099_379_114_800_2, 0.375_890_992_932_605_7];

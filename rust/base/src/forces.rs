@@ -98,7 +98,7 @@ pub struct Round {
 }
 
 impl Round {
-    /// For so many bodies: two rounds of partners and what a chunk may reach beyond them, and whole chunks of bodies.
+    /// An array for `n` bodies: two rounds of partners and what a chunk may read beyond them, and whole chunks of bodies.
     pub fn new(n: usize, dim: usize) -> Self {
         let rounds = (2 * n + 4 * SIDE).next_multiple_of(SIDE);
         Round {
@@ -421,7 +421,7 @@ pub(crate) const LOGARITHMIC: u8 = 0;
 pub(crate) const NEWTON: u8 = 1;
 const PRINTED: u8 = 2;
 
-/// Which kernel meets the bodies: chosen once, called for each force.
+/// The kernel that meets the bodies: chosen once, called for each force.
 #[derive(Clone, Copy, Debug)]
 pub struct Kernel {
     /// The force.
@@ -430,21 +430,21 @@ pub struct Kernel {
     pub rounding: Rounding,
     /// 2 or 3.
     pub dim: usize,
-    /// What it may use.
+    /// The instruction set.
     pub level: Level,
 }
 
-/// What a kernel works on: the bodies meet at the distances of one slab.
+/// The input and output of a kernel: the bodies meet at the distances of one slab.
 pub struct Meeting<'a> {
     /// How many bodies.
     pub n: usize,
-    /// At which distances.
+    /// The distances at which they meet.
     pub groups: &'a [Distances],
-    /// Where they are.
+    /// The places of the bodies.
     pub round: &'a Round,
-    /// Room for what they collect.
+    /// Buffers for the sums of each body.
     pub sums: &'a mut Sums,
-    /// Whether to add to what is there.
+    /// Whether to add to these sums, or to replace them.
     pub more: bool,
     /// When set, the kernel returns early with unfinished sums.
     pub stop: &'a AtomicBool,

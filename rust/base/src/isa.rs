@@ -27,10 +27,10 @@ impl std::error::Error for UnknownLevel {}
 /// Forces the kernels: `interpret`, or a level whose machine code is written.
 const KERNELS: &str = "STEPWELL_KERNELS";
 
-/// What the hot loop may use, in ascending order.
+/// The instruction sets of hot loops, in ascending order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Level {
-    /// What every CPU of the platform has (SSE2 on x86-64, NEON on AArch64), without machine code that is written at run time.
+    /// The baseline of the platform (SSE2 on x86-64, NEON on AArch64), without machine code that is written at run time.
     Baseline,
     /// 128-bit vectors of AArch64, which every such CPU has.
     Neon,
@@ -42,7 +42,7 @@ pub enum Level {
 
 /// A hot loop. `run` must be `#[inline(always)]`, all the way down, or it is compiled for the baseline.
 pub trait Task {
-    /// Does it.
+    /// Runs the loop.
     fn run(self);
 }
 
@@ -126,7 +126,7 @@ pub trait Isa: Copy + Send + Sync + 'static {
     fn run(self, task: impl Task);
 }
 
-/// What every CPU of the platform has.
+/// The instruction set that every CPU of the platform has.
 #[derive(Clone, Copy)]
 pub struct Baseline;
 

@@ -13,12 +13,12 @@ use crate::{
     isa::{Isa, Level, Task, with_isa},
 };
 
-/// Whether to stop is asked for after so many bodies.
+/// Bodies between two checks of the stop flag.
 const STOPPED_AFTER: usize = 128 * SIDE;
 
-/// Some bodies without mass, and what pulls them.
+/// A share of the bodies without mass, and the bodies that attract them.
 pub struct Pulled<'a> {
-    /// Their numbers, in ascending order.
+    /// The numbers of the massless bodies, in ascending order.
     pub bodies: &'a [u32],
     /// The places of all bodies, one after the other.
     pub y: &'a [f64],
@@ -30,7 +30,7 @@ pub struct Pulled<'a> {
     pub soft: f64,
     /// When set, the kernel returns early.
     pub stop: &'a AtomicBool,
-    /// h times the acceleration of the bodies from number `first` on, of which those without mass are set.
+    /// h times the acceleration of the bodies from number `first` on; only those of bodies without mass are set.
     pub out: &'a mut [f64],
     /// The number of the first body of `out`.
     pub first: usize,

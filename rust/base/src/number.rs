@@ -23,7 +23,7 @@ pub enum Function {
 /// The Taylor coefficients of a solution, from the first on, and the functions with several branches that its rates have.
 #[derive(Clone, Debug)]
 pub struct Series<N> {
-    /// Of each order as many as the state has numbers.
+    /// For each order as many coefficients as the state has numbers.
     pub terms: Vec<Vec<N>>,
     /// The branches that the rates are on.
     pub branches: Vec<Branch<N>>,
@@ -44,9 +44,9 @@ pub struct Branch<N> {
 /// The derivatives of rates; none where one is known to be zero.
 #[derive(Clone, Debug)]
 pub struct Derivatives<N> {
-    /// By each number of the state: one for each rate.
+    /// Derivatives by each number of the state: one for each rate.
     pub by_state: Vec<Vec<Option<N>>>,
-    /// By the time.
+    /// Derivatives by the time.
     pub by_time: Vec<Option<N>>,
 }
 
@@ -117,15 +117,15 @@ pub trait Number:
     #[must_use]
     fn shift_down(self, places: u32) -> Self;
 
-    /// The same number; a symbol notes that it is this function of another.
+    /// Returns the number itself; a symbol records that it is `function` of `of`.
     #[must_use]
     fn marked(self, _function: Function, _of: Self) -> Self {
         self
     }
 
-    /// The Taylor coefficients, from the first to the one of that order, of a solution that starts so and whose rates a function
-    /// makes of the start and of the time. The time is its value, the unit in powers of which the coefficients are, and this over
-    /// the one of the rates. Only symbols have a record of how rates were made, so of numbers there is no series.
+    /// The Taylor coefficients 1 to `order` of the solution from `start`, whose rates a function computes from state and time.
+    /// `time` has the time, the unit in whose powers the coefficients count, and this unit over that of the rates. Only symbols
+    /// record how rates were computed; plain numbers have no series.
     fn series(_order: u32, _start: &[Self], _time: [Self; 3], _rates: &mut dyn FnMut() -> Vec<Self>) -> Option<Series<Self>> {
         None
     }

@@ -9,17 +9,17 @@ pub enum Error {
     /// An unknown system.
     #[error("there is no system {name:?}; known: {known}")]
     UnknownSystem {
-        /// What was given.
+        /// The name that was given.
         name: String,
-        /// What there is.
+        /// The known names.
         known: String,
     },
     /// An unknown method.
     #[error("there is no method {name:?}; known: {known}")]
     UnknownMethod {
-        /// What was given.
+        /// The name that was given.
         name: String,
-        /// What there is.
+        /// The known names.
         known: String,
     },
     /// An unknown option of a system.
@@ -27,7 +27,7 @@ pub enum Error {
     Options {
         /// The system's name.
         system: String,
-        /// What was given.
+        /// The options that were given.
         options: String,
     },
     /// A method that needs ÿ = a(t, y) and a system that is not of that kind.
@@ -52,9 +52,9 @@ pub enum Error {
     /// A step that is too long for one tape, which fused multiply-adds need.
     #[error("fused: a step of about {operations} operations is too long; fused multiply-adds work with steps of up to {most}")]
     TooLongToFuse {
-        /// What a step has.
+        /// Operations of a step.
         operations: usize,
-        /// What it may have.
+        /// The most operations of a step.
         most: usize,
     },
     /// A system whose series has too many operations.
@@ -62,9 +62,9 @@ pub enum Error {
         "method: the series of this system has about {operations} operations a step, and may have {most}; take dop853 for a large system"
     )]
     TooLongForSeries {
-        /// What a step has.
+        /// Operations of a step.
         operations: usize,
-        /// What it may have.
+        /// The most operations of a step.
         most: usize,
     },
     /// A step by Kepler motions that is too long.
@@ -72,9 +72,9 @@ pub enum Error {
         "method: a step by Kepler motions of so many bodies has about {operations} operations, and may have {most}; take leapfrog for many bodies"
     )]
     TooLongToSplit {
-        /// What a step has.
+        /// Operations of a step.
         operations: usize,
-        /// What it may have.
+        /// The most operations of a step.
         most: usize,
     },
     /// A step that is too long to solve equations.
@@ -83,13 +83,13 @@ pub enum Error {
          operations, and may have {most_unknowns} and {most}; take an explicit method for a system that large"
     )]
     TooLongToSolve {
-        /// What a step has.
+        /// Operations of a step.
         operations: usize,
-        /// What it may have.
+        /// The most operations of a step.
         most: usize,
-        /// How many numbers it solves for.
+        /// Unknowns of a step.
         unknowns: usize,
-        /// How many there may be.
+        /// The most unknowns of a step.
         most_unknowns: usize,
     },
     /// A step that is too long for one tape, on which alone members have times of their own.
@@ -98,23 +98,23 @@ pub enum Error {
          a run for each t0"
     )]
     TooLongForTimes {
-        /// What a step has.
+        /// Operations of a step.
         operations: usize,
-        /// What it may have.
+        /// The most operations of a step.
         most: usize,
     },
     /// A step that is too long for one tape, which numbers of 32 bits need.
     #[error("dtype: a step of about {operations} operations is too long; float32 works with steps of up to {most}")]
     TooLongForSingle {
-        /// What a step has.
+        /// Operations of a step.
         operations: usize,
-        /// What it may have.
+        /// The most operations of a step.
         most: usize,
     },
-    /// What is not computed with numbers of 32 bits.
+    /// A part of the model that float32 does not support.
     #[error("dtype: float32 does not work with {of}; use float64")]
     NotSingle {
-        /// What was asked for.
+        /// The name of this part.
         of: &'static str,
     },
     /// Adaptive steps under a control whose push depends on the step, of a system too long for one tape.
@@ -125,7 +125,7 @@ pub enum Error {
     /// Arrays that do not fit together.
     #[error("{what}: expected {expected}, got {got}")]
     Shape {
-        /// Which array.
+        /// The name of the array.
         what: &'static str,
         /// How many numbers it should have.
         expected: usize,

@@ -31,7 +31,7 @@ use stepwell_core::{
     tape::{Op, split::Body},
 };
 
-/// What one turn of the innermost loop does, by numbers of instructions.
+/// The work of one turn of the innermost loop, by numbers of instructions.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 struct Turn {
     /// Sums, products, quotients and roots, by whether they are of whole vectors of the shape.
@@ -120,7 +120,7 @@ fn oscillator(method: &str) -> Model<'static> {
     oscillators(PER_MEMBER.0, method)
 }
 
-/// With samples of their own.
+/// An oscillator, with samples of each member's own.
 fn held(method: &str) -> Model<'static> {
     let tables = vec![("x", Table { samples: vec![PER_MEMBER; 5], start: 0.0, interval: 0.1 })];
     let (words, rows) = ([("form", "canonical")], [("omega", vec![PER_MEMBER])]);
@@ -172,7 +172,7 @@ fn tapes(model: &Model) -> Arc<Tapes> {
     model.traced().unwrap().tapes().unwrap()
 }
 
-/// The kernel that a run of so many members has, what a turn of its loop does, and how much arithmetic a step is.
+/// The kernel for a run of `members` members, the work of a turn of its loop, and how much arithmetic a step is.
 fn written(model: &Model, level: Level, members: usize) -> (Shape, Turn, usize) {
     let tapes = tapes(model);
     let body = &tapes.step.split.body;
@@ -280,7 +280,7 @@ fn few_members_spill_nothing_where_there_are_32_registers() {
     }
 }
 
-/// What a kernel of many members does beside its arithmetic, in percent of it: all instructions, and what is spilled.
+/// The overhead of a kernel of many members, in percent of its arithmetic: all instructions, and spills.
 fn beside(model: &Model, level: Level) -> (usize, usize) {
     let (_, turn, _) = written(model, level, UNLIMITED);
     (100 * (turn.all - turn.arithmetic) / turn.arithmetic, 100 * turn.spilled / turn.arithmetic)
@@ -348,9 +348,9 @@ fn what_all_members_have_in_common_is_in_no_loop() {
     }
 }
 
-/// So it takes no longer either, but for what the caches do. A mass on the ring is eight operations. Number by number and in
-/// vectors of one member's numbers, and over many members: at most so many instructions and spills for ten operations, and a
-/// tenth more than in a shorter step.
+/// A longer step takes no longer for an operation, but for the caches. A mass on the ring is eight operations. Number by number
+/// and in vectors of one member's numbers, and over many members: at most this many instructions and spills for ten operations,
+/// and a tenth more than in a shorter step.
 #[test]
 fn a_longer_step_has_no_more_instructions_for_an_operation() {
     for level in levels() {

@@ -55,7 +55,7 @@ fn last(plan: &FixedRun) -> Result<Last, Error> {
     last_of(plan)
 }
 
-/// The same, of either precision.
+/// The last v and y and the steps at which members diverged, in either precision.
 fn last_of<T: Steppable>(plan: &FixedRun) -> Result<Last<T>, Error> {
     let [mut v, mut y] = [(); 2].map(|()| vec![T::of(0.0); plan.members]);
     let mut bad = vec![-1; plan.members];

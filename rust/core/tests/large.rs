@@ -75,13 +75,13 @@ fn bodies(n: usize, dim: usize, force: &str, control: &[(&str, &str)]) -> Signat
     signature("nbody", &[&[("force", force)], control].concat(), &[("dim", dim)], &rows, &[])
 }
 
-/// Bodies of which every so many-th alone has mass.
+/// Bodies; only every `every`-th has mass.
 fn with_massless(n: usize, every: usize, dim: usize, force: &str, control: &[(&str, &str)]) -> Signature {
     let massless = (0..n as u32).filter(|i| *i as usize % every != 1).collect();
     Signature { lists: vec![("massless".to_owned(), massless)], ..bodies(n, dim, force, control) }
 }
 
-/// A net in so many dimensions: a lattice of rows of particles side by side, whose springs lie in runs, and some springs across,
+/// A net in `dim` dimensions: a lattice of rows of particles side by side, whose springs lie in runs, and some springs across,
 /// which do not. The first particle is fixed if there is more than one row.
 fn net(rows: usize, columns: usize, dim: usize, numbers: &[(&str, usize)], control: &[(&str, &str)]) -> Signature {
     let n = rows * columns;
@@ -156,14 +156,14 @@ fn numbers(count: usize, seed: u64) -> Vec<f64> {
     (0..count).map(|_| next()).collect()
 }
 
-/// Rows of parameters and samples of so many members.
+/// Rows of parameters and samples of `members` members.
 fn spec<'a>(signature: &Signature, numbers: &'a [f64], members: usize) -> Spec<'a> {
     let rows: Vec<Row> = numbers.chunks(members).map(Row).collect();
     let tables = signature.tables.iter().map(|_| Table { samples: rows[..9].to_vec(), start: 0.29, interval: 0.011 }).collect();
     Spec { signature: signature.clone().into(), rows: rows[..signature.parameters()].to_vec(), tables }
 }
 
-/// What a group makes of members: states, quantities and sums after some steps, by bits, its lane's first for each row.
+/// The results of a group for members: states, quantities and sums after some steps, by bits, its lane's first for each row.
 fn made(group: &mut dyn Group, spec: &Spec, member: usize, count: usize, state: &[f64]) -> Vec<Vec<u64>> {
     let lanes = group.lanes();
     group.prepare(spec, member, count);

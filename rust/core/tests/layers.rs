@@ -16,7 +16,7 @@ const LAYERS: [&str; 10] = ["error", "tape", "kernel", "model", "stage", "step",
 type Module = Vec<String>;
 /// The source of every module.
 type Sources = BTreeMap<Module, String>;
-/// What each module imports.
+/// The imports of each module.
 type Imports = BTreeMap<Module, BTreeSet<Module>>;
 
 /// Reads the modules of a folder.
@@ -192,7 +192,7 @@ fn upward(sources: &Sources) -> Vec<String> {
     lines
 }
 
-/// The modules of a circle, each of which imports the next; none if there is no circle.
+/// The modules of a circle, where each imports the next; none if there is no circle.
 fn circle(imports: &Imports) -> Vec<Module> {
     fn follow(module: &Module, imports: &Imports, way: &mut Vec<Module>, done: &mut BTreeSet<Module>) -> bool {
         if let Some(start) = way.iter().position(|passed| passed == module) {

@@ -52,7 +52,7 @@ impl Random {
 struct Case {
     equations: Arc<Equations>,
     watched: Option<Arc<Equations>>,
-    /// Of each parameter one number, or one for each member.
+    /// For each parameter one number, or one for each member.
     parameters: Vec<Vec<f64>>,
     v: Vec<f64>,
     y: Vec<f64>,
@@ -170,7 +170,7 @@ struct StepStrategy {
 }
 
 impl Case {
-    /// What is stepped, of the members of a range.
+    /// The model of the members in a range.
     fn model(&self, method: &str, of: &std::ops::Range<usize>) -> Model<'_> {
         let rows = self.parameters.iter().map(|row| if row.len() == 1 { Row(&row[..]) } else { Row(&row[of.clone()]) });
         let rows: Vec<Row> = rows.collect();

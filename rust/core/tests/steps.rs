@@ -142,7 +142,7 @@ fn a_program_has_no_entry_of_which_nothing_is_made() {
     }
 }
 
-/// What is given to a system: words and whole numbers, numbers of rows, sampled inputs, all by name.
+/// The signature of a system: words and whole numbers, numbers of rows, sampled inputs, all by name.
 fn signature(
     system: &str,
     words: &[(&str, &str)],
@@ -188,7 +188,7 @@ const CONTROLS: [[(&str, &str); 2]; 4] = [
     [("control", "projection"), ("control.way", "nacozy")],
 ];
 
-/// A net in so many dimensions: a lattice of rows of particles side by side, whose springs lie in runs, and some springs across,
+/// A net in `dim` dimensions: a lattice of rows of particles side by side, whose springs lie in runs, and some springs across,
 /// which do not. The first particle is fixed if there is more than one row.
 fn net(rows: usize, columns: usize, dim: usize, numbers: &[(&str, usize)], control: &[(&str, &str)]) -> Signature {
     let n = rows * columns;
@@ -306,7 +306,7 @@ fn own() -> [Signature; 4] {
     ]
 }
 
-/// What a step makes: the state, then the tally.
+/// The result of a step: the state, then the tally.
 fn step<N: Number>(method: &Method, make: Make<N>, p: &Parameters<N>, shape: Shape, t: N, state: &[N], tally: N) -> Vec<N> {
     let system = around::wrap(p, make(p), tally);
     let (v, y) = state.split_at(shape.v);
@@ -338,7 +338,7 @@ fn sample(table: u32, t: f64) -> f64 {
     f64::from(table) + (3.0 * t).floor()
 }
 
-/// What the tape makes of these numbers.
+/// The values of the tape for these numbers.
 fn evaluate(tape: &Tape, roots: &[Id], h: f64, t: f64, parameters: &[f64], state: &[f64]) -> Vec<u64> {
     let mut values: Vec<u64> = Vec::with_capacity(tape.ops().len());
     for op in tape.ops() {

@@ -133,14 +133,14 @@ impl EventsOf<'_> {
 /// An array of whole numbers, or of others.
 type Whole = Py<PyArray1<i64>>;
 type Real = Py<PyArray1<f64>>;
-/// Of members at rest their numbers, those of their events, whether these lead them back, since when the state was changed as
+/// For each member at rest its number, its event, whether that leads it back, since when the state was changed as
 /// often as it may be, and which events set each other off.
 type Rests = Vec<(i64, i64, bool, f64, Vec<bool>)>;
-/// Of each event the members, steps, shares, times and states of its occurrences; how many each member has; when members stopped;
+/// Per event the members, steps, shares, times and states of its occurrences; how many each member has; when members stopped;
 /// whether a saved time changed their steps; the members at rest.
 pub(crate) type AllFound = (Vec<(Whole, Whole, Real, Real, Real)>, Whole, Real, Py<PyArray1<bool>>, Rests);
 
-/// What was found.
+/// The occurrences that were found, and what else a run with events reports.
 pub(crate) fn found(py: Python<'_>, events: &Events) -> AllFound {
     let mut found = events.found.lock().unwrap_or_else(PoisonError::into_inner);
     let Found { occurrences, counts, stopped_at, other_steps, rests } = std::mem::take(&mut *found);
@@ -158,7 +158,7 @@ pub(crate) fn found(py: Python<'_>, events: &Events) -> AllFound {
     (of_each.collect(), counts, stopped_at, other_steps.into_pyarray(py).unbind(), rests.into_iter().map(of_rest).collect())
 }
 
-/// Locates changes of sign of an event of so many members: see `locate` of the core. Returns the shares, and the states.
+/// Locates changes of sign of an event of `of_all` members: see `locate` of the core. Returns the shares, and the states.
 #[pyfunction]
 pub(crate) fn locate(
     py: Python<'_>,

@@ -49,8 +49,7 @@ fn sound(value: &Bound<'_, PyAny>, finite: bool, positive: bool) -> bool {
     (!finite || all(numbers, |x| x.abs() < f64::INFINITY)) && (!positive || all(numbers, |x| x > 0.0))
 }
 
-/// Whether something is true of all numbers. Those of which it is not are counted, without an early end: so the loop is over
-/// vectors.
+/// Whether something is true of all numbers. Exceptions are counted, without an early end: so the loop is over vectors.
 fn all<T: Copy>(numbers: &[T], is: impl Fn(T) -> bool) -> bool {
     numbers.iter().map(|x| u64::from(!is(*x))).sum::<u64>() == 0
 }
@@ -79,7 +78,7 @@ fn isa_levels() -> Vec<&'static str> {
     Level::available().into_iter().map(Level::name).collect()
 }
 
-/// What is read of a plan: see `Plan` in `runs/engine/plan.py`.
+/// The attributes of a plan that are read: see `Plan` in `runs/engine/plan.py`.
 #[derive(FromPyObject)]
 struct PlanOf {
     t0: f64,
@@ -92,7 +91,7 @@ struct PlanOf {
     progress: Option<Py<PyAny>>,
 }
 
-/// What a run begins with and what it fills: see `Arrays` in `runs/engine/plan.py`.
+/// The input and output of a run: see `Arrays` in `runs/engine/plan.py`.
 #[derive(FromPyObject)]
 struct ArraysOf<'py, T: Element + 'py> {
     v: Bound<'py, PyArray2<f64>>,
@@ -116,7 +115,7 @@ fn run(py: Python<'_>, model: &ModelSpec, plan: PlanOf, arrays: Bound<'_, PyAny>
     }
 }
 
-/// The same with events: returns what was found of them, too.
+/// Makes a run with events, as `run`, and returns their occurrences, too.
 #[pyfunction]
 fn run_and_look(
     py: Python<'_>,
@@ -261,7 +260,7 @@ struct KeptStepsOf<'py> {
     y: PyReadwriteArrayDyn<'py, f64>,
 }
 
-/// What a run with a tolerance begins with and what it fills: see `AdaptiveArrays` in `runs/engine/adaptive.py`.
+/// The input and output of a run with a tolerance: see `AdaptiveArrays` in `runs/engine/adaptive.py`.
 #[derive(FromPyObject)]
 struct AdaptiveArraysOf<'py> {
     v: Bound<'py, PyArray2<f64>>,
@@ -284,7 +283,7 @@ fn adapt(py: Python<'_>, model: &ModelSpec, plan: PlanOf, pacing: PacingOf, arra
     adapt_with(py, model, plan, pacing, arrays, None)
 }
 
-/// The same with events: returns what was found of them, too.
+/// Makes a run with events, as `adapt`, and returns their occurrences, too.
 #[pyfunction]
 fn adapt_and_look(
     py: Python<'_>,
@@ -346,7 +345,7 @@ fn adapt_with(
 }
 
 thread_local! {
-    /// What this thread asks at intervals while it steps: signals reach the main thread alone.
+    /// The function that this thread asks at intervals while it steps: signals reach the main thread alone.
     static ASKED: RefCell<Option<Py<PyAny>>> = const { RefCell::new(None) };
 }
 
@@ -454,7 +453,7 @@ fn operations(py: Python<'_>, model: &ModelSpec) -> PyResult<usize> {
     Ok(traced.operations.1)
 }
 
-/// To how many function evaluations a step with a series is equal: see `_core.pyi`.
+/// The cost of a step with a series, in function evaluations: see `_core.pyi`.
 #[pyfunction]
 #[pyo3(signature = (model, *, attempts=false))]
 fn series_evaluations(py: Python<'_>, model: &ModelSpec, attempts: bool) -> PyResult<usize> {
@@ -464,7 +463,7 @@ fn series_evaluations(py: Python<'_>, model: &ModelSpec, attempts: bool) -> PyRe
     Ok(tapes.series_evaluations)
 }
 
-/// The tape and machine code of a step, made anew for so many members: see `_core.pyi`.
+/// The tape and machine code of a step, made anew for `members` members: see `_core.pyi`.
 #[pyfunction]
 #[pyo3(signature = (model, members, *, choice=0, attempts=false))]
 fn compiled<'py>(

@@ -13,7 +13,7 @@ use stepwell_core::{
 
 use crate::model::{argument_error, core_error};
 
-/// Everything that a method says of itself.
+/// The metadata of a method.
 fn describe<'py>(py: Python<'py>, r: &Record) -> PyResult<Bound<'py, PyDict>> {
     let d = PyDict::new(py);
     for (name, fact) in r.facts() {

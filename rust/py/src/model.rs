@@ -1,4 +1,4 @@
-//! What to step: names, parameters and tables that stay Python's.
+//! The model to step: names, parameters and tables that stay Python's.
 
 use std::sync::Arc;
 
@@ -70,7 +70,7 @@ pub(crate) fn core_error(error: Error) -> PyErr {
     error_of(name, error.to_string())
 }
 
-/// That of 32 bits, or that of 64.
+/// The precision of 32 bits, or of 64.
 pub(crate) fn precision(single: bool) -> Precision {
     if single { Precision::Single } else { Precision::Double }
 }
@@ -93,7 +93,7 @@ impl Equations {
         self.0.reads_time()
     }
 
-    /// Whether the rates are made of pieces, one of which is chosen by the state or the time.
+    /// Whether the rates are piecewise, with a choice by the state or the time.
     #[getter]
     fn chooses(&self) -> bool {
         self.0.chooses()
@@ -179,7 +179,7 @@ fn add_rows<'a>(array: &'a PyReadonlyArray2<'_, f64>, rows: &mut Vec<Row<'a>>) -
 
 #[pymethods]
 impl ModelSpec {
-    /// `given` is a list of names and what is given under them; `matrix` is the nodes of the transition-matrix form and the
+    /// `given` is a list of names and their values; `matrix` is the nodes of the transition-matrix form and the
     /// number of rows in its v slot, if it is asked for; `order` is that of a series with adaptive steps; `single` is whether
     /// steps are computed with numbers of 32 bits; `acceptance` is that of `reference/acceptance.py`, and `backward` whether
     /// adaptive steps go back in time.
@@ -325,12 +325,12 @@ impl ModelSpec {
         Ok(Spec { signature: self.signature.clone(), rows: all, tables: self::tables(tables)? })
     }
 
-    /// What the core steps.
+    /// The model that the core steps.
     pub fn model<'a>(&'a self, how: StepKind, rows: &'a Rows<'_>, tables: &'a Tables<'_>) -> PyResult<Model<'a>> {
         Ok(self.of(how, self.spec(rows, tables)?))
     }
 
-    /// What the core steps, of a system with parameters.
+    /// The model that the core steps, of a system with parameters.
     pub fn of<'a>(&self, how: StepKind, spec: Spec<'a>) -> Model<'a> {
         let Self { signature, record, fused, precision, .. } = self;
         // The matrix form says itself which products are fused, whatever they are made of.

@@ -19,11 +19,11 @@ use crate::{
     world::machine,
 };
 
-/// A run is prepared if it makes at most so many steps of numbers: without threads it is as fast, and it takes some milliseconds.
+/// A run is prepared up to this many steps of numbers: without threads it is as fast, and it takes some milliseconds.
 const MOST_NUMBER_STEPS: f64 = MIN_NUMBER_STEPS_FOR_THREADS;
-/// And so many times the steps after which a longer run would look for Ctrl-C.
+/// The most steps of a prepared run, in intervals between two checks for Ctrl-C of a longer run.
 const MOST_CHECKS: i64 = 4;
-/// Other threads of Python go on meanwhile from so many steps of numbers on: to let them takes longer than a shorter run.
+/// From this many steps of numbers on other threads of Python go on meanwhile: releasing the GIL takes longer than a shorter run.
 const FEW_NUMBER_STEPS: f64 = 1e4;
 /// How much longer than the start of the shortest member all numbers at the end may be in all, squared, so that no member has
 /// grown as `runs/findings/growth.py` means it, with room for the rounding of sums.
@@ -53,7 +53,7 @@ struct Run<T> {
     y: Vec<T>,
 }
 
-/// A prepared run of so many members, from starts whose blocks have these shapes, none for one number; None if it takes so long
+/// A prepared run of `members` members, from starts whose blocks have these shapes, none for one number; None if it takes so long
 /// that preparation does not matter.
 #[pyfunction]
 pub(crate) fn prepared(
@@ -156,8 +156,8 @@ impl Prepared {
     }
 }
 
-/// Takes the numbers of a block, all finite, and whether it could: from one number for all, or an array of this shape, of floats
-/// of 64 or 32 bits.
+/// Reads a block into `to`: one number for all, or an array of this shape, of floats of 64 or 32 bits. Returns false if it has
+/// another shape or type, or is not finite.
 pub(crate) fn read<T: Real>(block: &Bound<'_, PyAny>, shape: &[usize], to: &mut [T]) -> bool {
     if let Ok(number) = block.cast_exact::<PyFloat>() {
         if !shape.is_empty() {
@@ -178,7 +178,7 @@ pub(crate) fn read<T: Real>(block: &Bound<'_, PyAny>, shape: &[usize], to: &mut 
     all(to, |x| x.is_below(T::INFINITY))
 }
 
-/// Takes the numbers of an array of this shape, and whether it could.
+/// Reads an array into `to`. Returns false if it has another shape.
 fn take<F: Element + Copy, T: Real>(
     array: &Bound<'_, PyArrayDyn<F>>,
     shape: &[usize],
@@ -197,7 +197,7 @@ fn take<F: Element + Copy, T: Real>(
     true
 }
 
-/// So many numbers are added side by side, as vectors.
+/// Numbers that are added side by side, as vectors.
 const SIDE_BY_SIDE: usize = 32;
 
 /// The sum of the squares of some numbers, in any order.

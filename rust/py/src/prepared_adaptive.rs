@@ -29,27 +29,27 @@ pub struct PreparedAdaptive {
     kept: Mutex<Kept>,
     /// The shapes of both blocks of a start.
     shapes: [Vec<usize>; 2],
-    /// Whether it is looked for amounts that became negative.
+    /// Whether to check for amounts that became negative.
     has_amounts: bool,
     /// A quantity has changed if its change is more than this part of its size.
     least_change: f64,
-    /// From so many accepted steps on more is looked for than here.
+    /// Runs with at least this many accepted steps are checked for stiffness, and so are left to the caller.
     many: f64,
 }
 
-/// What is kept from run to run.
+/// The parts that are kept from run to run.
 struct Kept {
     lanes: adaptive::Prepared,
-    /// What computes the quantities that the true motion keeps, if there are some, and its parameters.
+    /// The world that computes the invariants of the true motion, if there are some, and its parameters.
     quantities: Option<(World, Py<ModelSpec>)>,
     input: Input,
     state: Vec<f64>,
     status: Vec<i64>,
-    /// A run took long, so that all later ones are for others.
+    /// A run took long, so that all later ones are left to the caller.
     is_long: bool,
 }
 
-/// What a run begins with.
+/// The input of a run.
 struct Input {
     machine: Machine,
     at: Rows,

@@ -33,7 +33,7 @@ use crate::{
     world::machine,
 };
 
-/// Of each operation its name, how many operands it has, among which counts it is, and whether these may be exchanged.
+/// For each operation its name, how many operands it has, among which counts it is, and whether these may be exchanged.
 #[pyfunction]
 pub(crate) fn tape_operations() -> Vec<(&'static str, usize, &'static str, bool)> {
     OPERATIONS.to_vec()
@@ -276,7 +276,7 @@ impl Symbol {
 #[pyclass(module = "stepwell._core", frozen)]
 pub struct Evaluation(pub(crate) Values);
 
-/// Of 64 bits, or of 32.
+/// Values of 64 bits, or of 32.
 #[derive(Clone)]
 pub(crate) enum Values {
     Double(evaluation::Evaluation),
@@ -293,7 +293,7 @@ impl Evaluation {
     }
 }
 
-/// One number for all members, or one for each.
+/// A number for all members, or one for each.
 #[derive(FromPyObject)]
 enum Numbers<'py> {
     Common(f64),
@@ -344,7 +344,7 @@ impl Evaluation {
 
 #[pymethods]
 impl Tape {
-    /// For numbers of 64 bits, or of 32.
+    /// A tape for numbers of 64 bits, or of 32.
     #[new]
     #[pyo3(signature = (*, single=false))]
     fn new(single: bool) -> Tape {
@@ -382,7 +382,7 @@ impl Tape {
         Symbol { tape: Arc::clone(&self.0), id }
     }
 
-    /// A constant, by its bits, of which a tape of 32 bits has the lower half.
+    /// A constant, by its bits; a tape of 32 bits takes the lower half.
     fn constant(&self, bits: u64) -> Symbol {
         self.leaf(Op::Const(bits))
     }
@@ -500,8 +500,8 @@ impl Tape {
         Ok((Tape(fused), symbols))
     }
 
-    /// These values for many members at once, from so many numbers of a state and from parameters; None if they depend on a step
-    /// or a time. Where they depend on samples, events alone take them.
+    /// An evaluation of these values for many members at once, from `states` numbers of a state and from parameters; None if they
+    /// depend on a step or a time. Where they depend on samples, events alone take them.
     fn evaluation(&self, of: Vec<PyRef<'_, Symbol>>, states: usize) -> PyResult<Option<Evaluation>> {
         let (tape, roots) = self.with(&of)?;
         let of = match tape.precision() {

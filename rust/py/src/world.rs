@@ -71,7 +71,7 @@ impl<T: Of> ForceArray<T> {
         Ok(ForceArray::Few { buffer: PyBuffer::get(array.bind(py))?, copy: vec![T::default(); numbers] })
     }
 
-    /// Gives the world what is in the array now.
+    /// Gives the world the force in the array.
     fn read(&mut self, py: Python<'_>, world: &mut world::World<T>) -> PyResult<()> {
         match self {
             ForceArray::Few { buffer, copy } => {
@@ -94,7 +94,7 @@ struct LiveArray {
     /// The number of its first row among those of all parameters, and how long its rows are.
     place: usize,
     width: usize,
-    /// What its numbers are above, and at most.
+    /// The bounds of its numbers: above the first, at most the second.
     bounds: (f64, f64),
 }
 
@@ -109,7 +109,7 @@ struct Live {
 }
 
 impl Live {
-    /// Of these arrays: a name, the array, the rows that it is, and the bounds of its numbers.
+    /// The parameters behind these arrays: a name, the array, the rows that it is, and the bounds of its numbers.
     fn new(py: Python<'_>, model: &ModelSpec, arrays: Vec<WatchedArray>) -> PyResult<Live> {
         let copied = |rows: Vec<Row<'_>>| rows.iter().map(|row| row.0.to_vec()).collect::<Vec<_>>();
         let (mut rows, mut tables, mut live) = (Vec::new(), Vec::new(), Vec::new());
@@ -131,7 +131,7 @@ impl Live {
         Ok(Live { signature: Arc::clone(&model.signature), rows, tables, arrays: live, waits: false })
     }
 
-    /// Gives the world what is in the arrays now, if it is not what was there before.
+    /// Gives the world the numbers in the arrays, if they have changed.
     fn read<T: Of>(&mut self, py: Python<'_>, world: &mut world::World<T>, changes: &AtomicI64) -> PyResult<()> {
         let Live { rows, arrays, waits, .. } = self;
         for LiveArray { name, array, now, last, place, width, bounds } in arrays {
@@ -182,22 +182,22 @@ fn table(start: f64, interval: f64, samples: &[Vec<f64>]) -> Table<'_> {
     Table { samples: borrowed(samples), start, interval }
 }
 
-/// A name, its array, the parameter of which it is the rows, and the bounds of its numbers: above the first, at most the second.
+/// A name, its array, the parameter whose rows it has, and the bounds of its numbers: above the first, at most the second.
 type WatchedArray = (String, Py<PyArray1<f64>>, String, f64, f64);
 
-/// Arrays of parameters of up to so many numbers are read number by number.
+/// Arrays of parameters of up to this many numbers are read number by number.
 const ONE_BY_ONE: usize = 16;
-/// Arrays of up to so many numbers are copied.
+/// Arrays of up to this many numbers are copied.
 const COPIED_NUMBERS: usize = 256;
-/// Other threads of Python go on meanwhile, unless a call is shorter than this part of the time between two checks: then to let
-/// them would take longer than the call.
+/// Other threads of Python go on meanwhile, unless a call is shorter than this part of the time between two checks: releasing the
+/// GIL would take longer than the call.
 const CALL_IS_SHORT: i64 = 64;
-/// Arrays of more numbers are checked once in so many steps for whether they are finite.
+/// Larger arrays are checked once in this many steps for whether they are finite.
 const STEPS_PER_CHECK: i64 = 8;
 /// Steps above this are no longer exact as floating-point numbers.
 const LAST_STEP: i64 = 1 << 53;
 
-/// Numbers of which the arrays of a world are made.
+/// The numbers in the arrays of a world.
 trait Of: Steppable + Element + PyElement {}
 impl<T: Steppable + Element + PyElement> Of for T {}
 
@@ -225,12 +225,12 @@ struct Loop<T: Of> {
     live: Option<Live>,
     /// Steps since it was last checked whether the state is finite.
     unchecked: i64,
-    /// What is known of its members, if events are looked for.
+    /// The event search of its members between calls.
     between: world::Between,
 }
 
 impl<T: Of> Loop<T> {
-    /// Over these arrays.
+    /// A loop over these arrays.
     fn new(
         py: Python<'_>,
         mut world: world::World<T>,
@@ -330,7 +330,7 @@ impl Loop<f64> {
     }
 }
 
-/// What a step of episodes makes: observations by members, rewards, and whether members ended and were cut off.
+/// The output of a step of episodes: observations by members, rewards, and whether members ended and were cut off.
 struct Made<'a> {
     seen: &'a mut [f32],
     rewards: &'a mut [f64],
@@ -338,7 +338,7 @@ struct Made<'a> {
 }
 
 impl<T: Of> Loop<T> {
-    /// One step, of which only the first rows of y go on.
+    /// One step, after which only the first rows of y go on.
     fn play(&mut self, py: Python<'_>, [kept, read]: [usize; 2], made: Made<'_>, changes: &AtomicI64) -> PyResult<()> {
         let Loop { world, arrays, force, live, .. } = self;
         if let Some(live) = live {
@@ -394,7 +394,7 @@ fn by_member<T: Of, const N: usize>(seen: &mut [f32], rows: &[T], lanes: usize) 
     }
 }
 
-/// What is read of a plan: see `Plan` in `runs/engine/plan.py`.
+/// The attributes of a plan that are read: see `Plan` in `runs/engine/plan.py`.
 #[derive(FromPyObject)]
 struct WorldPlan {
     t0: f64,
@@ -584,7 +584,7 @@ impl World {
         })
     }
 
-    /// What a sampled controller remembers, by rows.
+    /// The memory of a sampled controller, by rows.
     fn memory<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         self.alone(|loops| {
             Ok(match loops {
@@ -594,7 +594,7 @@ impl World {
         })
     }
 
-    /// Lets a sampled controller remember this, by rows.
+    /// Sets the memory of a sampled controller, by rows.
     fn remember(&self, memory: &Bound<'_, PyAny>) -> PyResult<()> {
         fn of<T: Of>(own: &mut Loop<T>, memory: &Bound<'_, PyAny>) -> PyResult<()> {
             own.world.remember(memory.extract::<PyReadonlyArray1<'_, T>>()?.as_slice()?);
@@ -619,7 +619,7 @@ impl World {
     }
 }
 
-/// What the loops of worlds may use.
+/// The instruction set and threads of the loops of worlds.
 pub(crate) fn machine() -> PyResult<Machine> {
     Ok(Machine { level: Level::choose().map_err(|unknown| core_error(unknown.into()))?, threads: 1 })
 }

@@ -1,4 +1,4 @@
-//! Values of a tape for many members, each from numbers of its own: what is looked at between steps.
+//! Values of a tape for many members, each from numbers of its own: the quantities that are checked between steps.
 
 use std::sync::{Arc, LazyLock};
 
@@ -19,7 +19,7 @@ use crate::{
     },
 };
 
-/// Numbers of which values are made, and the stages that have been made of them.
+/// A type of number in which values are computed, and the cache of its stages.
 pub trait Cached: Real {
     /// The stage of a tape that is not cut.
     fn stage(body: Body) -> Result<Arc<Stage<Self>>, Error>;
@@ -64,8 +64,8 @@ impl<T: Real> Clone for Evaluation<T> {
 }
 
 impl<T: Cached> Evaluation<T> {
-    /// Of values that depend on `states` numbers of the state, on parameters and on samples; none if they depend on a step or a
-    /// time, which of 32 bits are the first numbers of the state, or, of 32 bits, on samples.
+    /// Compiles values that depend on `states` numbers of the state, on parameters and on samples; none if they depend on a step
+    /// or a time, which of 32 bits are the first numbers of the state, or, of 32 bits, on samples.
     pub fn new(tape: &Tape, values: &[Id], states: usize) -> Result<Option<Evaluation<T>>, Error> {
         let number = |op: &Op| if let Op::Param(i) = op { *i as usize + 1 } else { 0 };
         let parameters = tape.ops().iter().map(number).max().unwrap_or(0);
@@ -97,7 +97,7 @@ impl<T: Cached> Evaluation<T> {
 }
 
 impl Evaluation {
-    /// Computes the values of so many members, by rows, from rows of the state and of the parameters.
+    /// Computes the values of `members` members, by rows, from rows of the state and of the parameters.
     pub fn run(&self, level: Level, (state, parameters): (&[Row], &[Row]), members: usize, values: &mut [f64]) {
         // A power of two, since kernels for fewer members than that are kept.
         let compiled = self.stage.compiled(level, members.next_power_of_two());
@@ -141,17 +141,17 @@ impl<T: Real> Filled<T> {
         Filled { compiled, lanes, states: evaluation.states, rows, values, pool: None, scratch: Vec::new() }
     }
 
-    /// For rows of so many lanes.
+    /// A tile of `lanes` lanes.
     pub(crate) fn of_lanes(evaluation: &Evaluation<T>, level: Level, lanes: usize) -> Filled<T> {
         Filled::new(evaluation, evaluation.stage.compiled_for_lanes(level, lanes))
     }
 
-    /// A row of the state or, behind these, of the parameters; of those that nothing depends on there may be none.
+    /// A row of the state or, after these, of the parameters; empty where no value depends on them.
     pub(crate) fn row(&mut self, i: usize) -> &mut [T] {
         self.rows.chunks_exact_mut(self.lanes).nth(i).unwrap_or_default()
     }
 
-    /// Takes the parameters of so many members from `first` on.
+    /// Takes the parameters of the `count` members from `first` on.
     pub(crate) fn prepare(&mut self, parameters: &[Row], first: usize, count: usize) {
         for (i, parameter) in parameters.iter().enumerate() {
             let row = self.row(self.states + i);
@@ -188,7 +188,7 @@ pub(crate) struct Evaluator<'a, T: Real = f64> {
     parameters: &'a [Row<'a>],
     tables: &'a [Table<'a>],
     level: Level,
-    /// For one or two members, and for many.
+    /// Tiles for one or two members, and for many.
     tiles: [Option<Filled<T>>; 2],
     /// The values of one member.
     values: Vec<f64>,
@@ -198,10 +198,10 @@ pub(crate) struct Evaluator<'a, T: Real = f64> {
 
 /// Fewer members are computed one by one.
 pub(super) const FEW: usize = 3;
-/// So many together are worth the most lanes.
+/// From this many members on, the widest tile pays.
 const MANY: usize = 64;
 
-/// A tile for about so many members, with the parameters that all have in common.
+/// A tile for about `members` members, with the parameters that all have in common.
 fn tile_of<'t, T: Real>(
     tile: &'t mut Option<Filled<T>>,
     evaluation: &Evaluation<T>,

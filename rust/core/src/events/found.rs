@@ -1,4 +1,4 @@
-//! What is found of the events of a run.
+//! The occurrences that a run finds of its events.
 
 /// Occurrences of an event, in no order.
 #[derive(Debug, Default)]
@@ -46,7 +46,7 @@ pub struct Found {
 }
 
 impl Found {
-    /// For so many events and members.
+    /// An empty record of `events` events and `members` members.
     pub fn new(events: usize, members: usize) -> Found {
         Found {
             occurrences: (0..events).map(|_| Occurrences::default()).collect(),

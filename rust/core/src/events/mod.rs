@@ -1,4 +1,4 @@
-//! Events: changes of sign of quantities along a motion. They are looked for between the states of steps, and located within a
+//! Events: changes of sign of quantities along a motion. They are sought between the states of steps, and located within a
 //! step by steps of other lengths from its start.
 
 pub(crate) mod course;

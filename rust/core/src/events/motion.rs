@@ -1,4 +1,4 @@
-//! What is known of a motion between the states of its steps: steps of any length, rates, and the quantities of events.
+//! The motion between the states of a run: steps of any length, rates, and the quantities of events.
 
 use std::{fmt, sync::Mutex};
 
@@ -21,7 +21,7 @@ const SHORT: f64 = 1.0 / (1u64 << 26) as f64;
 pub struct Values<'a, T: Real = f64> {
     /// The values.
     pub of: Evaluation<T>,
-    /// One number for all members, or one for each.
+    /// The parameters, one number for all members, or one for each.
     pub parameters: Vec<Row<'a>>,
     /// The sampled inputs, if the values depend on such.
     pub tables: Vec<Table<'a>>,
@@ -35,13 +35,13 @@ impl<T: Cached> Values<'_, T> {
 
 /// A step, of a time, a length and a state; of 32 bits its numbers are rounded to these.
 pub enum Trial<'a> {
-    /// Of 64 bits.
+    /// Numbers of 64 bits.
     Double(Values<'a>),
-    /// Of 32.
+    /// Numbers of 32 bits.
     Single(Values<'a, f32>),
 }
 
-/// What computes it.
+/// The evaluator of a [`Trial`].
 enum Trials<'a> {
     Double(Evaluator<'a>),
     Single(Evaluator<'a, f32>),
@@ -93,9 +93,9 @@ impl Times<'_> {
 
 /// An event.
 pub struct Event<'a> {
-    /// Its times, if they are known: its quantity then never changes its sign.
+    /// The times of the event, if they are known: its quantity then never changes its sign.
     pub times: Option<Times<'a>>,
-    /// Its quantity, of a time and a state.
+    /// The quantity, of a time and a state.
     pub quantity: Values<'a>,
     /// The rate of change of that, of a time, a state and the rates of change of these; none if it has no derivative.
     pub slope: Option<Values<'a>>,
@@ -103,7 +103,7 @@ pub struct Event<'a> {
     pub then: Option<Values<'a>>,
     /// The sign of the changes that count; 0 for both.
     pub direction: f64,
-    /// At which change it stops a member; 0 for none.
+    /// The number of the change at which it stops a member; 0 for none.
     pub terminal: i64,
     /// How many changes of a member are kept.
     pub most: i64,
@@ -117,11 +117,11 @@ pub struct Events<'a> {
     pub step: Trial<'a>,
     /// Whether the steps of the run are such steps, to the last bit; fused ones are not.
     pub repeats: bool,
-    /// By how much a state changes in a step at its rates, of the same numbers.
+    /// The change of a state in a step at its rates, of the same numbers.
     pub rates: Values<'a>,
     /// How many numbers a state has, v before y.
     pub numbers: usize,
-    /// With adaptive steps: of how many groups of numbers the largest sizes are known.
+    /// The number of groups whose largest sizes are known, with adaptive steps.
     pub groups: usize,
     /// The times of step 0.
     pub begin: Row<'a>,
@@ -131,9 +131,9 @@ pub struct Events<'a> {
     pub way: f64,
     /// The jumps of adaptive steps, as known times.
     pub jumps: Option<Times<'a>>,
-    /// What hot loops may use.
+    /// The instruction set of hot loops.
     pub level: Level,
-    /// What was found so far.
+    /// The occurrences found so far.
     pub found: Mutex<Found>,
 }
 
@@ -145,7 +145,7 @@ impl fmt::Debug for Events<'_> {
 
 /// The numbers of a state, or one of each event: few, so that they stand in place.
 pub(crate) type Numbers = SmallVec<[f64; 6]>;
-/// Something of each event that is so or not.
+/// A truth for each event.
 pub(crate) type Truths = SmallVec<[bool; 6]>;
 
 /// States of members at times, of `numbers` each, one after the other.
@@ -228,7 +228,7 @@ impl<'a> Motion<'a> {
         }
     }
 
-    /// By how much the state would change in such a step at its rates.
+    /// The change of the state in a step of length `h` at its rates.
     pub(crate) fn change(&mut self, At { member, t, state }: At, h: f64) -> &[f64] {
         self.rates.one(member, &[&[t, h], state])
     }
@@ -244,7 +244,7 @@ impl<'a> Motion<'a> {
         then.one(member, &[&[self.events.sign * t], state]).into()
     }
 
-    /// By how much a quantity would change in a step of such a length at the present rates.
+    /// The change of a quantity in a step of length `h` at the present rates.
     pub(crate) fn slope(&mut self, e: usize, at: At, h: f64) -> f64 {
         let (sign, At { member, t, state }) = (self.events.sign, at);
         let rates = self.rates.one(member, &[&[t, h], state]);
@@ -256,7 +256,7 @@ impl<'a> Motion<'a> {
         self.differences(e, &states, &[h], &rates)[0]
     }
 
-    /// The quantity of an event.
+    /// The quantities of an event in several states.
     pub(crate) fn quantity(&mut self, e: usize, at: &States) -> Vec<f64> {
         let (n, sign) = (self.events.numbers, self.events.sign);
         let mut inputs = Vec::with_capacity(at.t.len() * (n + 1));
@@ -267,7 +267,7 @@ impl<'a> Motion<'a> {
         self.quantities[e].0.run(&at.members, &inputs)
     }
 
-    /// By how much it would change in a step of such a length at the present rates.
+    /// The changes of the quantity in steps of these lengths at the present rates.
     pub(crate) fn slopes(&mut self, e: usize, at: &States, lengths: &[f64]) -> Vec<f64> {
         let (n, sign) = (self.events.numbers, self.events.sign);
         let inputs = self.with_lengths(at, lengths);
@@ -283,7 +283,7 @@ impl<'a> Motion<'a> {
         slope.run(&at.members, &inputs).into_iter().map(finite).collect()
     }
 
-    /// The same from a short step.
+    /// The slopes as differences over a short step.
     fn differences(&mut self, e: usize, at: &States, lengths: &[f64], rates: &[f64]) -> Vec<f64> {
         let sign = self.events.sign;
         let t = at.t.iter().zip(lengths).map(|(t, h)| sign * (sign * *t + SHORT * (sign * *h))).collect();

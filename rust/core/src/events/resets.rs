@@ -23,7 +23,7 @@ const AT: f64 = 8.0;
 const MOST_AT_ONCE: usize = 100;
 const FURTHER: f64 = 1.0 / (1u64 << 10) as f64;
 
-/// What is known of a member between its steps, by events where it is a list.
+/// State of the event search for a member between its steps; lists have an entry for each event.
 #[derive(Clone, Debug)]
 pub(crate) struct Memory {
     pub member: usize,
@@ -67,7 +67,7 @@ impl Memory {
         }
     }
 
-    /// Whether its next steps are to be looked at, whatever the quantities are.
+    /// Whether its next steps must be checked, whatever the quantities are.
     pub(crate) fn is_special(&self) -> bool {
         self.rest.is_some() || self.at.iter().any(|side| *side != 0.0)
     }
@@ -90,7 +90,7 @@ impl Memory {
         (self.before[e], self.now[e]) = (self.now[e], g);
     }
 
-    /// What is said of it if it is at rest.
+    /// The report on a member at rest, and since when it is at rest.
     pub(crate) fn said(&self) -> Option<(Rest, f64)> {
         let Resting { event, since } = self.rest?;
         let (led_back, often_since, circle) = (self.led_back[event], self.often_since, self.circle.to_vec());
@@ -98,7 +98,7 @@ impl Memory {
     }
 }
 
-/// What a member is after an instant at which events occurred.
+/// A member after an instant at which events occurred.
 pub(super) struct After {
     pub state: Numbers,
     pub at: Numbers,
@@ -108,7 +108,7 @@ pub(super) struct After {
     pub circles: bool,
 }
 
-/// What ends a stretch: its share, infinite if nothing does, and the time.
+/// The end of a stretch: its share, infinite if nothing ends it, and the time.
 struct Ahead {
     share: f64,
     t: f64,
@@ -151,7 +151,7 @@ pub(crate) struct Followed<'m> {
     pub stop: Option<Stop>,
 }
 
-/// What members come to in a step: their states, and each member's quantities.
+/// Results of a step: the members' states at the end, and each member's quantities.
 #[derive(Default)]
 struct Made {
     ends: Vec<f64>,
@@ -188,7 +188,7 @@ impl Watch<'_> {
         }
     }
 
-    /// The same of a member of a world, with its quantities: whether it begins at all, and was moved since the last call.
+    /// As `begin_member`, for a member of a world with known quantities: whether it begins, and was moved since the last call.
     pub(crate) fn begin_again(
         &mut self,
         memory: &mut Memory,

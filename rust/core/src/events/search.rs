@@ -39,7 +39,7 @@ pub(super) struct Looks {
     pub states: Vec<f64>,
 }
 
-/// So many units in the last place of a time are none.
+/// Times that differ by at most this many units in the last place are equal.
 const ROUNDINGS: f64 = 2.0;
 
 /// Whether there are only roundings of times between these: `is_no_time` of `runs/events/parts.py`.
@@ -91,7 +91,7 @@ impl Part {
 
 /// Shares of steps, by their numbers.
 pub(super) type Shares<'a> = &'a [(usize, f64)];
-/// What is asked for these.
+/// Evaluates a quantity at these shares.
 type Look<'a> = &'a mut dyn FnMut(Shares) -> Looks;
 /// Quantities there and, one after the other, the numbers of states.
 type Trial<'a> = &'a mut dyn FnMut(Shares) -> (Vec<f64>, Vec<f64>);
@@ -220,7 +220,7 @@ impl Bracket {
     }
 }
 
-/// Of a number above zero: by the power of two above it.
+/// The exponent of the power of two above a number above zero.
 fn exponent(x: f64) -> i32 {
     const SCALE: f64 = (1u64 << 54) as f64;
     let of_normal = |x: f64| (x.to_bits() >> 52) as i32 - 1022;

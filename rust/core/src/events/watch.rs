@@ -1,4 +1,4 @@
-//! Which events occur in steps: changes of sign are counted, located and kept, and members stop at them.
+//! The search for events in steps: changes of sign are counted, located and kept, and members stop at them.
 
 use std::sync::{Arc, PoisonError};
 
@@ -11,7 +11,7 @@ use super::{
 };
 use crate::step::watch::REACH;
 
-/// So many changes of sign are located together.
+/// Changes of sign that are located together.
 const LOCATED_AT_ONCE: usize = 1 << 10;
 
 /// A whole step of a member.
@@ -22,7 +22,7 @@ pub(crate) struct Step {
     pub number: i64,
     pub t: f64,
     pub h: f64,
-    /// The time at its end, or at that of the whole step of which it is a part.
+    /// The time at its end, or at the end of the whole step if this is a part of one.
     pub t_end: f64,
     pub start: Numbers,
     pub end: Numbers,
@@ -63,7 +63,7 @@ impl Noticed {
     }
 }
 
-/// Those of so many numbers each that go on.
+/// Of rows of `each` numbers, those whose entry in `on` is true.
 fn kept(numbers: &[f64], on: &[bool], each: usize) -> Vec<f64> {
     let some = numbers.chunks_exact(each.max(1)).zip(on).filter(|(_, on)| **on);
     some.flat_map(|(numbers, _)| numbers).copied().collect()
@@ -110,7 +110,7 @@ pub(crate) struct Watch<'a> {
     pub(super) found: Found,
     /// Steps in which something may occur.
     noticed: Vec<Noticed>,
-    /// In which the event may occur, and in which it does: they are located later, with others.
+    /// For each event, candidates to locate later, with others, and changes of sign.
     candidates: Vec<Vec<Candidate>>,
     changes: Vec<Vec<Change>>,
 }
@@ -136,7 +136,7 @@ impl<'a> Watch<'a> {
         }
     }
 
-    /// Begins with so many members from `first` on.
+    /// Begins with the `members` members from `first` on.
     pub(crate) fn begin(&mut self, first: usize, members: usize) {
         self.first = first;
         self.found = Found::new(self.motion.events.events.len(), members);
@@ -188,7 +188,7 @@ impl<'a> Watch<'a> {
         Vec::new()
     }
 
-    /// Takes steps in which events may occur, of which the start is known; as `take`.
+    /// Takes steps in which events may occur, from known starts; as `take`.
     pub(crate) fn notice(&mut self, noticed: Vec<Noticed>) -> Vec<Stop> {
         if self.stops() || self.noticed.len() + noticed.len() >= LOCATED_AT_ONCE {
             let all: Vec<_> = std::mem::take(&mut self.noticed).into_iter().chain(noticed).collect();
@@ -263,7 +263,7 @@ impl<'a> Watch<'a> {
         changes.into_iter().zip(located).filter(|(_, one)| counts(one)).map(|(change, _)| change).collect()
     }
 
-    /// The same for members that came from these sides to the event at the start; and which of them return to it within
+    /// As `within`, for members that came from these sides to the event at the start. Also returns those that return to it within
     /// roundings.
     pub(super) fn within_from(
         &mut self,
@@ -517,7 +517,7 @@ pub struct Brackets<'c> {
     pub members: &'c [i64],
     /// Time, length, both shares and both quantities.
     pub numbers: &'c [f64],
-    /// Both states.
+    /// The states of the step's start and of the part's end.
     pub states: &'c [f64],
 }
 
@@ -580,7 +580,7 @@ impl Events<'_> {
     }
 }
 
-/// Whether one of several quantities may do so, of which each stands in a row: one step before, and at both ends of a step.
+/// Whether one of several quantities may change its sign, each a row: one step before, and at both ends of a step.
 pub(crate) fn any_may_change([before, now, next]: [&[f64]; 3]) -> bool {
     let all = before.iter().zip(now).zip(next);
     all.fold(false, |any, ((before, now), next)| any | may_change(*before, *now, *next))

@@ -33,8 +33,8 @@ pub struct AdaptiveLanes {
     /// At the start of a step within which states are wanted: rows of the state, of the time, of one over the unit of time of the
     /// coefficients, and of what rounding left out.
     starts: Vec<f64>,
-    /// What goes by one lane at a time, from its first use on: attempts by known coefficients, and where a member stands at the
-    /// start.
+    /// Stages that run one lane at a time, built on first use: for attempts by known coefficients, and for the controller's
+    /// initial state.
     by_terms: Option<OneLane>,
     begin: Option<OneLane>,
     extension: Option<Extension>,
@@ -57,7 +57,7 @@ impl OneLane {
         OneLane { step: PreparedStage::new(stage, spec, level, 1, &Clock::NONE, budget), member: None, numbers }
     }
 
-    /// Runs it with a member's parameters, and the numbers of a lane from rows of so many lanes.
+    /// Runs the stage with a member's parameters, and the numbers of one lane from rows of `lanes` lanes.
     fn run(&mut self, stage: &Stage, spec: &Spec, member: usize, rows: &[f64], (lane, lanes): (usize, usize)) -> &[f64] {
         if self.member != Some(member) {
             self.step.prepare_lane(stage, spec, 0, member);
@@ -125,7 +125,7 @@ impl Task for Sums<'_> {
 }
 
 impl AdaptiveLanes {
-    /// For a run of so many members. With an extension, states within a step are those of it.
+    /// A batch for `members` members. With an extension, states within a step are those of the extension.
     pub fn new(
         traced: &Traced,
         spec: &Spec,

@@ -56,7 +56,7 @@ pub struct Lanes<T: Real = f64> {
 }
 
 impl<T: Traceable> Lanes<T> {
-    /// For a run of so many members.
+    /// A group for `members` members.
     pub fn new(traced: &Traced, spec: &Spec, level: Level, members: usize, clock: &Clock) -> Result<Lanes<T>, Error> {
         let tapes = traced.tapes_of::<T>()?;
         Lanes::with(traced, tapes.step.compiled(level, members), spec, level, clock)

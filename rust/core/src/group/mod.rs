@@ -74,7 +74,7 @@ pub trait Group<T: Real = f64>: Send + Sync {
         Vec::new()
     }
 
-    /// The same blocks, to write.
+    /// The blocks of [`Group::kept`], to write.
     fn kept_mut(&mut self) -> Vec<&mut [T]> {
         Vec::new()
     }
@@ -82,7 +82,7 @@ pub trait Group<T: Real = f64>: Send + Sync {
     /// The sums over the steps, such as the work of a control, and what is watched: rows of lanes, or nothing.
     fn tally(&self) -> &[T];
 
-    /// The same sums, to write.
+    /// The sums of [`Group::tally`], to write.
     fn tally_mut(&mut self) -> &mut [T];
 }
 
@@ -115,7 +115,7 @@ pub trait AdaptiveBatch: Send {
         None
     }
 
-    /// The same, to write; None, too, where the rows of the state are not numbers of 64 bits.
+    /// A row as [`AdaptiveBatch::row`], to write; None, too, where the rows of the state are not numbers of 64 bits.
     fn row_mut(&mut self, _number: usize) -> Option<&mut [f64]> {
         None
     }
@@ -123,10 +123,10 @@ pub trait AdaptiveBatch: Send {
     /// Sets the step-size control of a lane.
     fn set_pace(&mut self, lane: usize, pace: Pace<f64>);
 
-    /// What stands behind the step-size control of a lane: the largest sizes of its groups, and tolerances of their own.
+    /// The scales of a lane, which follow its step-size control: the largest sizes of its groups, and tolerances of their own.
     fn scales(&self, lane: usize) -> Vec<f64>;
 
-    /// Sets it.
+    /// Sets the scales of a lane.
     fn set_scales(&mut self, lane: usize, numbers: &[f64]);
 
     /// Whether it knows where a member stands at the start, so that [`AdaptiveBatch::begin`] can be asked.
@@ -137,7 +137,7 @@ pub trait AdaptiveBatch: Send {
     /// Brings the step-size control of a lane to what it is at the start of that member.
     fn begin(&mut self, _spec: &Spec, _lane: usize, _member: usize) {}
 
-    /// So many attempts of every lane that runs.
+    /// Makes `attempts` attempts in every lane that runs.
     fn attempt(&mut self, attempts: usize);
 
     /// Whether the coefficients of a series are known after an attempt, so that [`AdaptiveBatch::attempt_alone`] needs no

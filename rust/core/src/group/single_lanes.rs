@@ -31,7 +31,7 @@ pub struct SingleLanes {
     judged: PreparedStage,
     judged_rows: Aligned,
     inputs: Vec<Input>,
-    /// Of times of the run, which are negated where it goes back.
+    /// The sign of times of the run, which are negated where it goes back.
     sign: f64,
 }
 
@@ -53,7 +53,7 @@ impl Input {
 }
 
 impl SingleLanes {
-    /// For a run of so many members.
+    /// A batch for `members` members.
     pub(crate) fn new(traced: &Traced, spec: &Spec, level: Level, members: usize, budget: f64) -> Result<SingleLanes, Error> {
         let tapes = traced.tapes_of::<f32>()?;
         let StepKind::Attempts { backward, .. } = &traced.key().how else { return Err(Error::NoEstimate) };

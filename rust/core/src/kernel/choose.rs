@@ -10,19 +10,19 @@ use crate::{isa::Level, tape::split::Body};
 const MAX_CODE_OPERATIONS: usize = 2000;
 /// In steps of fewer operations than this, out-of-order execution overlaps several steps.
 const SHORT_STEP_OPERATIONS: usize = 48;
-/// So many vectors keep both the unit of roots and quotients and the others busy, if steps are so short that their code fits.
+/// This many vectors keep both the unit of roots and quotients and the others busy, if steps are so short that their code fits.
 const VECTORS_AROUND_SLOW: usize = 8;
 /// Longer chains, of evaluations that wait for each other, need more vectors, side by side.
 const MAX_SIDE_BY_SIDE_AROUND_SLOW: usize = 3;
 /// The most bytes of a tile's rows, so that they stay in the data cache.
 const MAX_ROW_BYTES: usize = 12 << 10;
 
-/// The shape for a run of so many members; none if the level has no machine code.
+/// The shape for a run of `members` members; none if the level has no machine code.
 pub fn choose(body: &Body, level: Level, members: usize) -> Option<Shape> {
     (level > Level::Baseline).then(|| fastest(body, level, members))
 }
 
-/// The shape for rows of so many numbers, each a number of a long block; none if they are not whole vectors.
+/// The shape for rows of `lanes` numbers, each a number of a long block; none if they are not whole vectors.
 pub fn choose_long(body: &Body, level: Level, lanes: usize) -> Option<Shape> {
     let bytes = body.precision.bytes();
     let width = match level {

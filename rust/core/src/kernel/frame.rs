@@ -1,8 +1,8 @@
-//! What the code of a kernel is called with, and what it may touch.
+//! The arguments of a kernel's code, and the memory that it may access.
 
 use crate::tape::split::Body;
 
-/// What a kernel is called with: the start of each thing it may touch. The layout is known to the writers.
+/// The arguments of a kernel: the start of each memory area. The writers know this layout.
 #[repr(C)]
 pub(super) struct Arguments {
     pub state: *mut u8,
@@ -32,7 +32,7 @@ pub(super) mod place {
     pub(crate) const ROUNDING: i32 = offset_of!(Arguments, rounding) as i32;
 }
 
-/// What the code of a kernel may touch, in numbers.
+/// The memory that the code of a kernel may access, in numbers.
 #[derive(Clone, Debug)]
 pub struct Frame {
     /// The sizes of a tile, and which entries of the table of the steps are places of rows.
@@ -43,12 +43,12 @@ pub struct Frame {
     pub pool: usize,
     /// Size of the spill area, which begins at a multiple of 64 bytes.
     pub scratch: usize,
-    /// A pool that is read by whole vectors of so many numbers is copied to where no vector lies across two lines of the cache.
+    /// Whether the pool is copied to where none of the vectors read from it lies across two lines of the cache.
     pub aligned_pool: bool,
 }
 
 impl Frame {
-    /// For a body. Of its operations only those that name places matter.
+    /// The frame of a body. Of its operations only those that name places matter.
     pub(crate) fn new(body: &Body, lanes: usize) -> Frame {
         let ops = body.ops.iter().copied().filter(|op| matches!(op, crate::tape::Op::Held(_))).collect();
         Frame { body: Body { ops, ..body.clone() }, lanes, pool: 0, scratch: 0, aligned_pool: false }

@@ -1,4 +1,4 @@
-//! What a kernel writer needs to know of a CPU to choose instructions.
+//! Facts about a CPU by which a kernel writer chooses instructions.
 
 use std::fmt::Debug;
 

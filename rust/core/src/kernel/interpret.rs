@@ -18,13 +18,13 @@ use crate::{
 pub struct Interpreter {
     lanes: usize,
     level: Level,
-    /// What the tile is checked against.
+    /// The body that tiles are checked against.
     body: Body,
-    /// What stays, and where.
+    /// The leaves that stay over all steps, with their rows.
     fixed: Vec<(Op, usize)>,
-    /// What is done in a step.
+    /// The operations of a step.
     steps: Vec<Step>,
-    /// Which row of the state is replaced by which after a step, where its place was not free before.
+    /// Rows of the state to replace after a step, each with its new row, where the result could not be written in place.
     next: Vec<(usize, usize)>,
     /// How many rows the scratch has.
     rows: usize,
@@ -39,7 +39,7 @@ struct Step {
 }
 
 impl Interpreter {
-    /// For rows of so many lanes.
+    /// An interpreter of `body` over rows of `lanes` lanes.
     pub fn new(body: &Body, lanes: usize, level: Level) -> Self {
         let count = body.ops.len();
         let mut last = vec![0; count];

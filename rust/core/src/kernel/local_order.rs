@@ -11,12 +11,12 @@ use super::{
     schedule::Waits,
 };
 
-/// So many results that wait at once are left as they are: most are in registers, and the order of the tape has fewer waits.
+/// A body with at most this many waiting results keeps its order: most are in registers, and the tape's order has fewer waits.
 pub(super) const MAX_WAITING: usize = 64;
-/// The same of vectors of one member's numbers: some that are spilled cost less than a wait.
+/// The limit for packed vectors of one member: some that are spilled cost less than a wait.
 pub(super) const MAX_WAITING_PACKED: usize = 128;
 
-/// What an operation reads; a leaf is in memory, and never waits.
+/// The operands of an operation; a leaf is in memory, and never waits.
 #[derive(Clone, Copy)]
 struct Node {
     of: [Id; 3],
@@ -43,7 +43,7 @@ pub fn in_local_order(body: &Body, most: usize) -> Body {
     Body { ops, next: body.next.iter().map(|id| place[*id as usize]).collect(), ..body.clone() }
 }
 
-/// The same of vectors of one member's numbers.
+/// As `in_local_order`, for packed vectors of one member.
 pub fn packed_in_local_order(packed: &Packed, most: usize) -> Packed {
     let node = |vector: &Vector| {
         let mut of = [0; 3];
@@ -108,8 +108,8 @@ fn waiting(nodes: &[Node], order: impl Iterator<Item = usize>) -> usize {
 
 struct Walk<'a> {
     nodes: &'a [Node],
-    /// Those that read each operation, one behind the other, and where those of an operation begin; how many of these are not
-    /// there yet, and how many of its operands are not.
+    /// Users of each operation, one behind the other, and where those of an operation begin; how many of these are not placed
+    /// yet, and how many of its operands are not.
     users: Vec<usize>,
     first: Vec<usize>,
     unread: Vec<u32>,
@@ -153,7 +153,7 @@ impl<'a> Walk<'a> {
         walk
     }
 
-    /// Those that read an operation.
+    /// The operations that read an operation.
     fn users(&self, id: usize) -> &[usize] {
         &self.users[self.first[id]..self.first[id + 1]]
     }

@@ -32,7 +32,7 @@ pub(crate) fn function<M: MakeOperation>(
 /// The register through which numbers are copied before the first step and after the last: no value is in any then.
 const FREE_BETWEEN_STEPS: u8 = 0;
 
-/// What stays in a register for the whole of the inner loop.
+/// Values that stay in a register for the whole of the inner loop.
 #[derive(Debug, Default)]
 struct Pinned {
     /// The old values of numbers of the state: number, vector, register.
@@ -44,7 +44,7 @@ struct Pinned {
 /// How many values are live at once, and when each is needed last.
 struct Pressure {
     most: u32,
-    /// Of each value how often it is read.
+    /// For each value how often it is read.
     reads: Vec<u32>,
 }
 
@@ -216,7 +216,7 @@ impl<'a, M: MakeOperation> Writer<'a, M> {
         }
     }
 
-    /// The same back to the rows of the state, after the last step.
+    /// Copies the packed state back to the rows of the state, after the last step.
     fn take_back(&mut self) {
         let Some(packing) = &self.plan.packing else { return };
         self.code.of_width(1);
@@ -254,7 +254,7 @@ impl<'a, M: MakeOperation> Writer<'a, M> {
         }
     }
 
-    /// To the rows of a block so many further on.
+    /// Moves the pointers to rows by `blocks` blocks.
     fn move_on(&mut self, blocks: i32) {
         let bytes = (self.shape.width * self.shape.block_vectors * self.shape.bytes) as i32 * blocks;
         if self.shape.blocks > 1 {

@@ -2,8 +2,8 @@
 
 use super::{instruction_set::InstructionSet, shape::Shape};
 
-/// What the pointers of a kernel point to. Those to rows are advanced from block to block, the one to the table from step to
-/// step.
+/// Memory areas of a kernel, by their pointers. Pointers to rows are advanced from block to block, the one to the table from
+/// step to step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Base {
     /// The rows of the state.
@@ -16,7 +16,7 @@ pub(crate) enum Base {
     PerStep,
     /// Rows of sampled inputs.
     Held,
-    /// What was spilled.
+    /// The spill area.
     Scratch,
 }
 
@@ -24,7 +24,7 @@ pub(crate) enum Base {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Place {
     pub base: Base,
-    /// So many bytes behind the base.
+    /// Offset from the base, in bytes.
     pub at: i32,
     /// The entry of the table of the steps that says how many numbers further on it is.
     pub held: Option<u32>,
@@ -33,13 +33,13 @@ pub(crate) struct Place {
 }
 
 impl Place {
-    /// A vector at so many bytes behind a base.
+    /// A vector `at` bytes behind a base.
     pub(crate) fn new(base: Base, at: i32) -> Place {
         Place { base, at, held: None, one: false }
     }
 }
 
-/// What is counted down.
+/// Loop counters.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Counter {
     Steps,
@@ -51,38 +51,38 @@ pub(crate) trait Machine: InstructionSet {
     /// The most operations of a kernel over all vectors of a block, so that its jumps reach.
     const MOST_OPERATIONS: usize;
 
-    /// Nothing written yet, room for about so many instructions.
+    /// An empty function, with room for about `instructions` instructions.
     fn new(shape: Shape, instructions: usize) -> Self;
 
-    /// What is written from here on is of vectors of so many numbers. Called only where numbers are moved between lanes.
+    /// Sets the width of the vectors that follow. Called only where numbers are moved between lanes.
     fn of_width(&mut self, _width: usize) {}
 
-    /// From memory to a register.
+    /// Loads from memory to a register.
     fn load(&mut self, register: u8, from: Place);
 
-    /// From a register to memory.
+    /// Stores a register to memory.
     fn store(&mut self, register: u8, to: Place);
 
-    /// From register to register.
+    /// Copies from register to register.
     fn copy(&mut self, to: u8, from: u8);
 
-    /// The start of the function: keeps what belongs to the caller, sets how numbers are rounded, gets the pointers and the
+    /// Starts the function: keeps what belongs to the caller, sets how numbers are rounded, gets the pointers and the
     /// number of steps.
     fn enter(&mut self);
 
-    /// The end of the function.
+    /// Ends the function.
     fn leave(&mut self);
 
-    /// The number of steps and the table of the steps from the start again.
+    /// Resets the number of steps and the table of the steps to the start.
     fn rewind(&mut self);
 
-    /// Moves a pointer by so many bytes.
+    /// Moves a pointer by `bytes` bytes.
     fn advance(&mut self, base: Base, bytes: i32);
 
     /// Sets the number of blocks to go.
     fn count_blocks(&mut self, blocks: i32);
 
-    /// What follows begins a line of the cache.
+    /// Aligns the next instruction to a line of the cache.
     fn align(&mut self);
 
     /// Where the next instruction will be, in bytes.

@@ -65,8 +65,8 @@ pub struct Tile<'a, T = f64> {
     pub pool: &'a [T],
     /// How many steps to make.
     pub steps: usize,
-    /// So many entries for each step as the body says: the bits of a number, or, for what is held, the place of the first number
-    /// of a row in `held`.
+    /// The entries of each step, as many as the body says: the bits of a number, or, for a held input, the place in `held` of the
+    /// first number of its row.
     pub per_step: &'a [u64],
     /// Rows of sampled inputs.
     pub held: &'a [T],

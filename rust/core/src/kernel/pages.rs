@@ -41,7 +41,7 @@ impl Pages {
         self.memory.code()
     }
 
-    /// What it may touch.
+    /// The memory that the code may access.
     pub(crate) fn frame(&self) -> &Frame {
         &self.frame
     }

@@ -45,14 +45,14 @@ pub(crate) struct Step<I> {
 }
 
 impl<I> Step<I> {
-    /// Of at most four operands.
+    /// A step of at most four operands.
     pub(crate) fn new(instruction: I, id: Id, operands: &[Id]) -> Step<I> {
         let mut of = [0; 4];
         of[..operands.len()].copy_from_slice(operands);
         Step { instruction, id, of, n: operands.len() as u8 }
     }
 
-    /// What it reads.
+    /// The values that it reads.
     pub(crate) fn of(&self) -> &[Id] {
         &self.of[..self.n as usize]
     }
@@ -61,10 +61,10 @@ impl<I> Step<I> {
 /// A body as machine instructions.
 #[derive(Debug)]
 pub(crate) struct KernelPlan<I> {
-    /// Of each value where it comes from.
+    /// For each value where it comes from.
     pub sources: Vec<Source>,
     pub steps: Vec<Step<I>>,
-    /// What replaces each number of the state; none if it stays.
+    /// The value that replaces each number of the state; none if it stays.
     pub next: Vec<Option<Id>>,
     /// The value of each number of the state before the step, if it is read.
     pub old: Vec<Option<Id>>,
@@ -80,18 +80,18 @@ pub(crate) struct KernelPlan<I> {
 /// that of its home.
 #[derive(Debug, Default)]
 pub(crate) struct Packing {
-    /// Of each value how many numbers it has.
+    /// For each value how many numbers it has.
     pub widths: Vec<u8>,
     /// How many homes there are, of the state first.
     pub homes: usize,
-    /// Before the first step: what is copied to which number of the homes.
+    /// Copies before the first step: each source, and the number of the homes that takes it.
     pub brought: Vec<(Source, usize)>,
-    /// After the last step: which number of the homes is which of the state.
+    /// Copies after the last step: a number of the homes, and the number of the state that takes it.
     pub returned: Vec<(usize, u32)>,
 }
 
 impl<I: Copy> KernelPlan<I> {
-    /// Of a body that [`is_sound`].
+    /// The plan of a body that [`is_sound`].
     pub(crate) fn new<M: InstructionSet<Instruction = I>>(body: &Body, machine: &M) -> KernelPlan<I> {
         let mut plan = KernelPlan {
             sources: Vec::with_capacity(body.ops.len() + 1),
@@ -217,7 +217,7 @@ pub(crate) fn is_sound(body: &Body) -> bool {
         })
 }
 
-/// Of each value whether all bits of a number are surely the same.
+/// For each value whether all bits of a number are surely the same.
 pub(crate) fn masks(body: &Body) -> Vec<bool> {
     let mut masks = Vec::with_capacity(body.ops.len());
     for op in &body.ops {
@@ -245,7 +245,7 @@ fn uses(body: &Body) -> Vec<u32> {
     uses
 }
 
-/// What a comparison and a choice by it are made by.
+/// An instruction that does both a comparison and the choice by it.
 #[derive(Clone, Copy, Debug)]
 enum Joined<I> {
     /// It compares two numbers and chooses of two others.

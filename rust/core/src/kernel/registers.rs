@@ -2,20 +2,20 @@
 //!
 //! Nothing here knows a CPU.
 
-/// Never, or nothing.
+/// No use, or no value.
 pub(crate) const NONE: u32 = u32::MAX;
 
-/// When each value is needed.
+/// The times at which each value is needed.
 #[derive(Debug)]
 pub(crate) struct Uses {
-    /// Of each value its next use, as a place in `uses`.
+    /// For each value its next use, as a place in `uses`.
     first: Vec<u32>,
-    /// When, and the place of the use after it.
+    /// The time of a use, and the place of the use after it.
     uses: Vec<(u32, u32)>,
 }
 
 impl Uses {
-    /// Of so many values.
+    /// A list of uses of `values` values, empty.
     pub(crate) fn new(values: usize) -> Uses {
         Uses { first: vec![NONE; values], uses: Vec::new() }
     }
@@ -47,9 +47,9 @@ impl Uses {
 /// Registers and what they hold.
 #[derive(Debug)]
 pub(crate) struct Registers {
-    /// Of each register the value that it holds.
+    /// For each register the value that it holds.
     holds: [u32; 32],
-    /// Of each value its register.
+    /// For each value its register.
     of: Vec<u8>,
     /// A bit for each register that can be taken.
     free: u32,
@@ -63,7 +63,7 @@ pub(crate) struct Registers {
 const NO_REGISTER: u8 = u8::MAX;
 
 impl Registers {
-    /// So many registers for so many values.
+    /// An allocator of `count` registers for `values` values.
     pub(crate) fn new(count: u8, values: usize) -> Registers {
         let free = if count == 32 { u32::MAX } else { (1 << count) - 1 };
         Registers { holds: [NONE; 32], of: vec![NO_REGISTER; values], free, kept: 0, locked: 0, count }
@@ -124,7 +124,7 @@ impl Registers {
         self.locked |= 1 << register;
     }
 
-    /// All may be changed again.
+    /// Lets all registers be changed again.
     pub(crate) fn unlock(&mut self) {
         self.locked = 0;
     }

@@ -18,20 +18,20 @@ use crate::{
 /// Each operation of the body is interpreted so often, counted over one lane, before machine code is written: writing an
 /// operation takes about as long.
 const INTERPRETATIONS_PER_WRITE: u64 = 4000;
-/// After so many steps of a single member it is tried whether equal operations can be lanes of one vector: that takes about as
+/// Steps of a single member after which packing of equal operations into lanes of one vector is tried: that takes about as
 /// long as these steps.
 const STEPS_PER_PACKING: u64 = 12_000;
 /// The cost of dispatching an operation over a row of lanes in the interpreter, in lanes.
 const LANES_PER_DISPATCH: usize = 10;
 
-/// Lanes that the interpreter takes at once where no shape sets their number: of so few members all, of many the fewest and the
-/// most. The more there are, the less it counts how long an operation takes to be dispatched.
+/// Lanes that the interpreter takes at once where no shape sets their number: all of a few members, and bounds for more. The
+/// more lanes, the less the time to dispatch an operation counts.
 const FEW_INTERPRETED: usize = 8;
 const INTERPRETED_LANES: [usize; 2] = [64, 256];
 /// The most bytes of the values of an interpreted step between these numbers of lanes, so that they stay in the L1 cache.
 const INTERPRETED_BYTES: usize = 16 << 10;
 
-/// How many lanes of a run of so many members the interpreter takes at once: the same for all turns, as nearly as can be.
+/// Lanes that the interpreter takes at once in a run of `members` members: the same for all turns, as nearly as can be.
 fn interpreted_lanes(body: &Body, members: usize) -> usize {
     if members <= FEW_INTERPRETED {
         return members.max(1);
@@ -42,7 +42,7 @@ fn interpreted_lanes(body: &Body, members: usize) -> usize {
     members.div_ceil(turns).next_multiple_of(FEW_INTERPRETED)
 }
 
-/// Which kernel runs. Each has its own layout of the uniform numbers: see [`Kernel::pool`].
+/// The kind of the kernel. Each has its own layout of the uniform numbers: see [`Kernel::pool`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum KernelKind {
     /// The interpreter.
@@ -69,19 +69,19 @@ pub(crate) struct Runner<T: Real = f64> {
 }
 
 impl<T: Real> Runner<T> {
-    /// For a run of so many members.
+    /// A runner for `members` members.
     pub(crate) fn new(body: &Body, level: Level, members: usize) -> Runner<T> {
         let shape = writer::choose(body, level, members);
         let lanes = shape.as_ref().map_or_else(|| interpreted_lanes(body, members), Shape::lanes);
         Runner::shaped(body, level, lanes, shape)
     }
 
-    /// For rows of so many lanes, each a number of a long block.
+    /// A runner for rows of `lanes` lanes, each a number of a long block.
     pub(crate) fn long(body: &Body, level: Level, lanes: usize) -> Runner<T> {
         Runner::shaped(body, level, lanes, writer::choose_long(body, level, lanes))
     }
 
-    /// With a shape that was chosen before; interpreted if there is none.
+    /// A runner with a given shape; interpreted if there is none.
     pub(crate) fn shaped(body: &Body, level: Level, lanes: usize, shape: Option<Shape>) -> Runner<T> {
         let interpreter = Interpreter::new(body, lanes, level.of_loops());
         let packed = OnceLock::new();
@@ -115,12 +115,12 @@ impl<T: Real> Runner<T> {
         self.shape.is_some_and(|shape| shape.packs())
     }
 
-    /// What it makes steps of.
+    /// The body that it runs.
     pub(crate) fn body(&self) -> &Body {
         &self.body
     }
 
-    /// What makes so many more steps.
+    /// The kernel for the next `steps` steps.
     pub(crate) fn kernel(&self, steps: usize) -> (&dyn Kernel<T>, KernelKind) {
         // Asked first: the count of what was done belongs to all threads, and to touch it takes longer than a short kernel.
         if let Some(Some(written)) = self.written.get() {

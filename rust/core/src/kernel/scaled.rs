@@ -13,26 +13,26 @@ use crate::tape::{
     split::Body,
 };
 
-/// Such products.
+/// Products x·2ⁿ in a body.
 pub(super) struct Scaled {
-    /// Of each value x and n, if it is one.
+    /// For each value x and n, if it is such a product.
     pub of: Vec<Option<[Id; 2]>>,
-    /// Of each value the sum that it is instead, if it is one with such a product.
+    /// For each value the sum that replaces it, if it is a sum with such a product.
     pub sums: Vec<Option<Op>>,
-    /// Whether it is a part of one, which nothing else uses.
+    /// Whether a value is a part of such a product, and has no other use.
     pub replaced: Vec<bool>,
 }
 
 /// 1.5·2⁵², and the exponent's bits of 1.
 const MAGIC: f64 = 6_755_399_441_055_744.0;
 const BIAS: f64 = 1023.0;
-/// By so many powers of two numbers are raised where n < 0.
+/// Numbers are raised by this many powers of two where n < 0.
 const RAISED: i32 = 100;
 /// Numbers between this power of two and its inverse are far from what is subnormal or infinite.
 const FAR: i32 = 900;
 
 impl Scaled {
-    /// Those of a body; the uses of what they replace are taken from the others.
+    /// Finds scalings in a body, and lowers the use counts of the operations they replace.
     pub(super) fn new(body: &Body, uses: &mut [u32]) -> Scaled {
         let ops = &body.ops;
         let mut made = Scaled { of: vec![None; ops.len()], sums: vec![None; ops.len()], replaced: vec![false; ops.len()] };

@@ -1,4 +1,4 @@
-//! In which order the operations of a step are written.
+//! The order in which the operations of a step are written.
 //!
 //! A CPU executes out of order, but only among the next few hundred operations. Several interleaved vectors give it enough to do.
 //! A long step leaves no registers for a second vector, and a single member has none: written function after function, such a
@@ -21,26 +21,25 @@ const MAX_SHARED: usize = 12;
 /// How many results of a single vector may wait to be used, for each register, if they do not fit into registers in any case:
 /// fewer waits then gain more than spills cost.
 const MAX_WAITING_PER_REGISTER: usize = 2;
-/// The same for vectors one after the other of which some wait for roots and quotients, also where there are fewer registers.
+/// Likewise for vectors one after the other, some of which wait for roots and quotients, also where there are fewer registers.
 const MAX_WAITING_AROUND_SLOW: usize = 32;
-/// So many results of a single vector may wait if what has the longest way to the end goes first: of a wide step nearly all
-/// would.
+/// Results of a single vector that may wait if the operation with the longest way to the end goes first: of a wide step nearly
+/// all would.
 const MAX_WAITING_LONGEST: usize = 128;
-/// So many operations an interleaved vector is behind the one before it: sums of some are then made while products of others are,
-/// by other units. Fitted to the fastest numbers on the scenes of the benchmarks; less where steps are so short that it would
+/// Operations by which an interleaved vector is behind the one before it: some units make its sums while others make products of
+/// the one before. Fitted to the fastest numbers on the scenes of the benchmarks; less where steps are so short that it would
 /// leave gaps.
 const MAX_BEHIND: usize = 3;
 const MIN_OPERATIONS_PER_BEHIND: usize = 6;
-/// The most where a single vector leaves no registers, as with three bodies in space: side by side, all need most at once. So
-/// they are spread over the step. Fitted likewise, to two to four bodies; two vectors gain nothing by it.
+/// The most such operations where a single vector leaves no registers, as with three bodies in space: in step, all vectors need
+/// most at once, so they are spread. Fitted likewise, to two to four bodies; two vectors gain nothing by it.
 const MAX_BEHIND_IF_WIDE: usize = 24;
-/// Of the operations whose operands are made or under way, so many are compared, from the first one on.
+/// Ready operations, with operands made or under way, that are compared for the next place, from the first one on.
 const MAX_COMPARED: usize = 64;
 /// A CPU begins two operations on long vectors in a cycle.
 const CYCLES_PER_OPERATION: f64 = 0.5;
 
-/// Operation after operation, each for all vectors that are interleaved; each vector is so many operations behind the one before
-/// it.
+/// Operation after operation, each for all vectors that are interleaved; each vector `behind` operations after the one before.
 pub fn in_turn(operations: usize, shape: Shape, behind: usize) -> Order {
     let mut order = Vec::with_capacity(operations * shape.block_vectors);
     for first in (0..shape.block_vectors).step_by(shape.interleaved) {
@@ -92,18 +91,18 @@ pub(super) fn order<I: Copy>(plan: &KernelPlan<I>, ops: &[Op], shape: Shape) -> 
     waits.shortened(&order, most_waiting)
 }
 
-/// What waits for what.
+/// The dependences of operations, and their latencies.
 pub struct Waits {
-    /// Of each operation those that make its operands.
+    /// For each operation, the operations that make its operands.
     operands: Vec<Vec<usize>>,
-    /// Those that use its result.
+    /// For each operation, the operations that use its result.
     users: Vec<Vec<usize>>,
-    /// After how many cycles its result is there, and after how many its unit can begin another one.
+    /// For each operation, after how many cycles its result is there, and after how many its unit can begin another one.
     time: Vec<[f64; 2]>,
 }
 
 impl Waits {
-    /// Of operations in an order in which operands come first: for each, those that make its operands, and its times.
+    /// The dependences of operations whose operands come first: for each, the operations that make its operands, and its times.
     pub fn new(operands: Vec<Vec<usize>>, time: Vec<[f64; 2]>) -> Waits {
         let mut users = vec![Vec::new(); operands.len()];
         for (i, of) in operands.iter().enumerate() {
@@ -163,7 +162,7 @@ impl Waits {
         order
     }
 
-    /// The order, changed where an operation would wait. At most so many results wait to be used, if that can be.
+    /// The order, changed where an operation would wait. If possible, at most `most_waiting` results wait to be used.
     pub fn shortened(&self, order: &Order, most_waiting: usize) -> Order {
         let operations = self.time.len();
         // Of an operation for a vector its place in the order.

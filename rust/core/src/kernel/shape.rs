@@ -30,7 +30,7 @@ impl Shape {
         self.width * self.block_vectors * self.blocks
     }
 
-    /// The same in words that every CPU has.
+    /// The shape in terms that every CPU has.
     pub(crate) fn layout(&self) -> Layout {
         let Shape { width, block_vectors, blocks, resident, .. } = *self;
         Layout { width, block_vectors, blocks, resident, registers: self.registers() }

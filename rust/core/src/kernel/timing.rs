@@ -2,13 +2,13 @@
 
 use crate::tape::Op;
 
-/// What carries out an operation.
+/// An execution unit of the CPU.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Unit {
     Sum,
     Product,
     Divider,
-    /// What moves numbers between lanes.
+    /// The unit that moves numbers between lanes.
     Moves,
     Bits,
 }
@@ -27,16 +27,16 @@ impl Unit {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Timing {
     pub unit: Unit,
-    /// After how many its result is there.
+    /// Cycles until its result is there.
     pub latency: u8,
-    /// For how many its unit is busy.
+    /// Cycles for which its unit is busy.
     pub busy: u8,
-    /// Likewise on a vector of 512 bits.
+    /// Cycles for which its unit is busy with a vector of 512 bits.
     pub busy_long: u8,
 }
 
 impl Timing {
-    /// Of an operation that its unit can begin in every cycle.
+    /// The times of an operation that its unit can begin in every cycle.
     pub(super) const fn quick(unit: Unit, latency: u8) -> Timing {
         Timing { unit, latency, busy: 1, busy_long: 1 }
     }
@@ -46,7 +46,7 @@ impl Timing {
         self.busy_long > 1
     }
 
-    /// After how many cycles another one on a vector of 512 bits can begin.
+    /// Cycles until another one on a vector of 512 bits can begin.
     pub(super) fn interval(self) -> f64 {
         f64::from(self.busy_long) / f64::from(self.unit.count())
     }

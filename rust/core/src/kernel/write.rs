@@ -18,9 +18,9 @@ pub(crate) enum Where {
     Nowhere,
     /// As its source says.
     Leaf,
-    /// In the scratch.
+    /// A slot of the scratch.
     Slot(u32),
-    /// In the row of a number of the state, which it has replaced.
+    /// The row of a number of the state, which it has replaced.
     State(u32),
 }
 
@@ -33,7 +33,7 @@ pub(crate) trait MakeOperation: Machine {
     fn make(writer: &mut Writer<Self>, step: &Step<Self::Instruction>, vector: usize, of: &[Value]) -> Option<u8>;
 }
 
-/// What is written, and what is where meanwhile.
+/// The code of a kernel while it is written, and where each value is at that point.
 #[derive(Debug)]
 pub(crate) struct Writer<'a, M: MakeOperation> {
     pub plan: &'a KernelPlan<M::Instruction>,
@@ -46,11 +46,11 @@ pub(crate) struct Writer<'a, M: MakeOperation> {
     pub registers: Registers,
     pub uses: Uses,
     pub memory: Vec<Where>,
-    /// Which number of the state a value of the plan replaces.
+    /// The number of the state that each value of the plan replaces.
     pub replaces: Vec<Option<u32>>,
-    /// Of each number of the state in each vector of the block its register, if it has one.
+    /// For each number of the state in each vector of the block its register, if it has one.
     pub homes: Vec<Option<u8>>,
-    /// Of the same, whether the next value waits for the old one to be read.
+    /// For the same, whether the next value waits for the old one to be read.
     pub waits: Vec<bool>,
     /// The current time: twice the index in the order.
     pub now: u32,
@@ -202,8 +202,8 @@ impl<M: MakeOperation> Writer<'_, M> {
         }
     }
 
-    /// The same for an instruction that overwrites an operand: one of `over` if it is not needed any more. None of the registers
-    /// `apart`.
+    /// As `result`, for an instruction that overwrites an operand: one of `over` if it is not needed any more. None of the
+    /// registers `apart`.
     pub(crate) fn result_over(&mut self, id: u32, vector: usize, of: &[Value], over: &[Value], apart: &[u8]) -> Option<u8> {
         let home = self.free_home(id, vector).filter(|home| !apart.contains(home));
         let own = over.iter().find_map(|value| {

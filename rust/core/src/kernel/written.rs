@@ -1,4 +1,4 @@
-//! From a body to machine code, for any CPU, and to a kernel, for this one.
+//! The steps from a body to machine code, for any CPU, and to a kernel, for this one.
 
 use super::{
     Kernel, Tile, aarch64,
@@ -23,13 +23,13 @@ use crate::{
 pub struct Assembled {
     /// The bytes of a function, from its first instruction on.
     pub code: Vec<u8>,
-    /// What it may touch.
+    /// The memory that the code may access.
     pub frame: Frame,
     /// How it goes through a tile.
     pub shape: Shape,
     /// The most values that are spilled at once.
     pub spills: usize,
-    /// Where the operations of one member are lanes of vectors: what that gains.
+    /// The gain by packing operations of one member into vectors, where that was tried.
     pub packing: Option<Verdict>,
     /// The bits of each.
     constants: Vec<u64>,
@@ -148,7 +148,7 @@ impl Written {
         self.pages.code()
     }
 
-    /// What the code may touch.
+    /// The memory that the code may access.
     pub fn frame(&self) -> &Frame {
         self.pages.frame()
     }

@@ -52,7 +52,7 @@ struct Extension {
 }
 
 impl LargeAdaptive {
-    /// Of rates by a method that estimates its error. `budget` is the most attempts of the member.
+    /// A large member with rates and a method that estimates its error. `budget` is the most attempts of the member.
     pub fn new(
         schedules: Arc<Schedules>,
         rates: Box<dyn Rates>,

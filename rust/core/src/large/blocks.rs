@@ -30,7 +30,7 @@ pub struct Schedules {
     pub finish: Option<BlockSchedule>,
     /// The coefficients of the continuous extension of an attempt.
     pub extension: Option<BlockSchedule>,
-    /// Of each block that the method keeps, whether it has the numbers of v.
+    /// For each block that the method keeps, whether it has the numbers of v.
     pub kept: Vec<bool>,
 }
 
@@ -38,7 +38,7 @@ pub struct Schedules {
 type SchedulesKey = (String, Option<usize>, RateTraits, Shape);
 
 impl Schedules {
-    /// Of a method that steps so, for rates with these traits: found before, or made now.
+    /// The cached schedules of a method for rates with these traits, built on first use.
     pub fn of(how: &StepKind, traits: RateTraits, shape: Shape) -> Result<Arc<Schedules>, Error> {
         static CACHE: LazyLock<Cache<SchedulesKey, Schedules>> = LazyLock::new(Cache::default);
         let (name, choice) = match how {

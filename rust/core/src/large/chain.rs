@@ -65,7 +65,7 @@ impl Rates for Chain {
         with_isa!(*level, |isa| isa.run(Pull { stiffness, by_mass, y, out }));
     }
 
-    /// Its energy, the only quantity.
+    /// Records the energy, the only quantity.
     fn record(&mut self, v: &[f64], y: &[f64], rows: &mut [f64]) {
         rows.fill(energy([&self.stiffness, &self.mass], v, y));
     }

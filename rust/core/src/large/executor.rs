@@ -23,7 +23,7 @@ pub(crate) struct Executor {
 
 const VECTOR: usize = 8;
 
-/// The distance of rows of so many numbers: their number, padded to whole vectors.
+/// The distance of rows of `numbers` numbers: their number, padded to whole vectors.
 pub(crate) fn stride(numbers: usize) -> usize {
     // Four vectors can be interleaved if their number is a multiple of four. Short rows are padded less: they would be half
     // empty.

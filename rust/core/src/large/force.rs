@@ -28,7 +28,7 @@ struct ForcedRates {
     attempts: Option<Attempts>,
 }
 
-/// Of attempts at adaptive steps, each of which has another h.
+/// The force for attempts at adaptive steps, each of which has another h.
 struct Attempts {
     force: Vec<f64>,
     /// Whether the rates of v are still to be multiplied by h.

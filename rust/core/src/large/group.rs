@@ -33,7 +33,7 @@ pub struct LargeGroup {
 }
 
 impl LargeGroup {
-    /// As many members as the rates have lanes, with so many recorded numbers each.
+    /// A group of as many members as the rates have lanes; `recorded` is how many numbers of each it records.
     pub fn new(
         schedules: Arc<Schedules>,
         rates: Box<dyn Rates>,

@@ -25,12 +25,12 @@ impl Samples {
 pub(crate) struct Inputs {
     signals: Vec<Signal<f64>>,
     samples: Vec<Samples>,
-    /// Of which samples a step sees the mean.
+    /// For each table, whether a step averages its samples.
     held: Vec<bool>,
 }
 
 impl Inputs {
-    /// Those of a member: `inputs[0]` and so on.
+    /// The inputs of a member: `inputs[0]` and so on.
     pub(crate) fn new(spec: &Spec, member: usize) -> Inputs {
         let signature = &spec.signature;
         let numbers = spec.rows.iter().map(|row| row.at(member)).collect();
@@ -46,7 +46,7 @@ impl Inputs {
         Inputs { signals: (0..signature.whole("inputs")).map(signal).collect(), samples: samples.collect(), held }
     }
 
-    /// Their values at a time, or those that steps over a window see.
+    /// Fills in the inputs at a time, or as steps over a window average them.
     pub(crate) fn fill(&self, t: f64, window: Option<Window<f64>>, values: &mut [f64]) {
         let at = |table: u32, t: f64| self.samples[table as usize].at(t);
         for (value, signal) in values.iter_mut().zip(&self.signals) {

@@ -40,7 +40,7 @@ pub struct Matrix {
 }
 
 impl Matrix {
-    /// With inputs at the times of the form.
+    /// The matrix form, with inputs at its times.
     pub fn new(spec: &Spec, shape: Shape, how: &StepKind, level: Level, clock: &Clock) -> Matrix {
         let (nodes, fused) = match how {
             StepKind::Matrix { nodes, fused } => (nodes.iter().map(|bits| f64::from_bits(*bits)).collect(), *fused),

@@ -1,7 +1,7 @@
 //! Products of a matrix with columns of numbers, summed in the order of the columns.
 //!
 //! A sum in a fixed order is a chain of additions that wait for each other. So several rows are summed at once: their chains run
-//! side by side, and a number of the state is read once for all of them. The entries are stored in panels of so many rows, in the
+//! side by side, and a number of the state is read once for all of them. The entries are stored in panels of a few rows, in the
 //! order in which they are used; rows of zeros fill the last panel. They change no sum.
 
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
@@ -88,7 +88,7 @@ impl Panels {
         self.all::<false>(parts, out, stop);
     }
 
-    /// The same by fused multiply-adds.
+    /// The product by fused multiply-adds.
     #[inline(always)]
     pub(crate) fn times_fused(&self, parts: [&[f64]; 3], out: &mut [f64], stop: &AtomicBool) {
         self.all::<true>(parts, out, stop);

@@ -16,7 +16,7 @@ pub struct RateTraits {
     pub second_order: bool,
     /// v̇ depends on v.
     pub reads_v: bool,
-    /// The rate of v comes times the step of an attempt, which was told by [`Rates::set_step`].
+    /// The rate of v comes times the step of an attempt, set by [`Rates::set_step`].
     pub stretched: bool,
 }
 
@@ -25,12 +25,12 @@ pub struct RateTraits {
 /// A block is a row for each of its numbers, each of a number for each lane. An output row may be longer, up to whole vectors of
 /// eight: the numbers behind the block are padding.
 pub trait Rates: Send + Sync {
-    /// The rates that these are around, if they are a wrapper: what a wrapper does not define is done by those.
+    /// The wrapped rates, if this is a wrapper: they provide what it does not define.
     fn inner(&self) -> Option<&dyn Rates> {
         None
     }
 
-    /// The same rates, to change.
+    /// The wrapped rates, to change.
     fn inner_mut(&mut self) -> Option<&mut dyn Rates> {
         None
     }
@@ -40,7 +40,7 @@ pub trait Rates: Send + Sync {
         1
     }
 
-    /// What is known of the rates.
+    /// Properties of the rates.
     fn traits(&self) -> RateTraits;
 
     /// The step of the attempt that comes, for rates that depend on it.
@@ -80,7 +80,7 @@ pub trait Rates: Send + Sync {
         }
     }
 
-    /// Both of one state.
+    /// Both rates of one state.
     fn both(&mut self, t: f64, v: &[f64], y: &[f64], [dv, dy]: [&mut [f64]; 2]) {
         self.dv(t, v, y, dv);
         self.dy(t, v, y, dy);
@@ -146,7 +146,7 @@ pub trait Rates: Send + Sync {
         self.inner().map_or(&[], |inner| inner.tally())
     }
 
-    /// The same sums, to write.
+    /// The sums of [`Rates::tally`], to write.
     fn tally_mut(&mut self) -> &mut [f64] {
         self.inner_mut().map_or(&mut [], |inner| inner.tally_mut())
     }
@@ -161,10 +161,10 @@ pub struct RatesRequest<'a> {
     pub shape: Shape,
     /// Quantities to record.
     pub record: &'a [String],
-    /// What hot loops may use.
+    /// The instruction set and threads of hot loops.
     pub machine: Machine,
     /// The step to which rates are scaled.
     pub h: f64,
-    /// Whether they are asked for by attempts at adaptive steps.
+    /// Whether the rates serve attempts at adaptive steps.
     pub attempts: bool,
 }

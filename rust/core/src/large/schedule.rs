@@ -27,7 +27,7 @@ pub(crate) const V: usize = 0;
 /// The row of the coordinates, likewise.
 pub(crate) const Y: usize = 1;
 
-/// Which rate.
+/// A rate, or another request of a schedule.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Rate {
     /// h·v̇
@@ -54,9 +54,9 @@ pub enum Rate {
 pub enum Action {
     /// A rate, from two rows into another. Of [`Rate::Velocity`] the increment is in the row `y`.
     Ask {
-        /// Which.
+        /// The requested rate.
         rate: Rate,
-        /// When in the step.
+        /// The time in the step.
         at: Time,
         /// Row of the velocities.
         v: usize,
@@ -67,7 +67,7 @@ pub enum Action {
     },
     /// Both rates of one state.
     Both {
-        /// When in the step.
+        /// The time in the step.
         at: Time,
         /// Rows of the state.
         state: [usize; 2],
@@ -76,7 +76,7 @@ pub enum Action {
     },
     /// The equations of the step, from the state at its start.
     Derive,
-    /// Their solution, from the rows of right-hand sides.
+    /// The solution of the equations, from the rows of right-hand sides.
     Solve([usize; 2]),
     /// One pass over the rows.
     Pass(Box<Stage>),
@@ -84,7 +84,7 @@ pub enum Action {
 
 /// The schedule for an arena.
 pub struct BlockSchedule {
-    /// In order.
+    /// The actions, in order.
     pub actions: Vec<Action>,
     /// How many rows the arena has.
     pub rows: usize,
@@ -103,7 +103,7 @@ pub enum Goal {
 
 #[derive(Clone, Copy, Debug)]
 enum Node {
-    /// What is in a row at the start.
+    /// The content of a row at the start.
     Start(usize),
     Ask(Rate, Time, usize, usize),
     Add(usize, usize),
@@ -140,11 +140,11 @@ impl Node {
 struct PassPlan {
     nodes: Vec<Node>,
     results: Vec<usize>,
-    /// Of each node that is asked for, its turn.
+    /// For each node that is asked for, its turn.
     turn: Vec<Option<usize>>,
-    /// What each pass writes.
+    /// The nodes that each pass writes.
     writes: Vec<BTreeSet<usize>>,
-    /// Of each node the pass that writes it.
+    /// For each node the pass that writes it.
     pass: Vec<Option<usize>>,
 }
 
@@ -156,7 +156,7 @@ impl BlockSchedule {
         passes.sum::<usize>()
     }
 
-    /// For blocks of that shape; blocks of no numbers are left alone.
+    /// The schedule for blocks of that shape; blocks of no numbers are left alone.
     pub fn new(program: &Program, results: &[Block], goal: Goal, traits: RateTraits, shape: Shape) -> BlockSchedule {
         let mut plan = PassPlan::new(program, results, goal, traits, shape);
         plan.keep_expensive();
@@ -270,7 +270,7 @@ impl PassPlan {
         }
     }
 
-    /// What a pass computes, and what it reads.
+    /// The nodes that a pass computes, and those that it reads.
     fn work(&self, pass: usize) -> (BTreeSet<usize>, BTreeSet<usize>) {
         let (mut computed, mut read) = (BTreeSet::new(), BTreeSet::new());
         let mut open: Vec<usize> = self.writes[pass].iter().copied().collect();

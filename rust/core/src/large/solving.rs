@@ -39,7 +39,7 @@ pub(crate) struct Equations {
 type EquationsKey = (Arc<Signature>, u64, bool);
 
 impl Equations {
-    /// Those of a system with this γ, found before or made now.
+    /// The cached solver for this γ, built on first use.
     pub(crate) fn of(key: &TapeKey, shape: Shape, gamma: f64) -> Result<Arc<Equations>, Error> {
         static CACHE: LazyLock<Cache<EquationsKey, Equations>> = LazyLock::new(Cache::default);
         let attempts = matches!(key.how, StepKind::Attempts { .. });
@@ -77,7 +77,7 @@ struct Elimination {
     exchanges: usize,
 }
 
-/// What an unknown's row does to later ones.
+/// The elimination of one unknown: the effect of its row on later ones.
 struct Turn {
     /// The later columns in which its row has a number.
     columns: Vec<Range<usize>>,
@@ -159,11 +159,11 @@ fn runs(mut numbers: Vec<usize>) -> Vec<Range<usize>> {
 struct Matrix {
     lanes: usize,
     unknowns: usize,
-    /// All entries, by rows; of each a number for each member.
+    /// The entries, by rows; of each a number for each member.
     entries: Aligned,
     /// The reciprocals of those on the diagonal.
     over: Vec<f64>,
-    /// Of each exchange whether it was made, and the multiple of the row that the other lost.
+    /// For each exchange whether it was made, and the multiple of the row that the other lost.
     exchanged: Vec<bool>,
     factors: Vec<f64>,
 }

@@ -160,7 +160,7 @@ impl RateTapes {
         })
     }
 
-    /// Those of a key, found before or made now; all methods share them.
+    /// The cached tapes for a key, built on first use and shared by all methods.
     pub fn of(key: &TapeKey) -> Result<Arc<RateTapes>, Error> {
         CACHE.find(&cache_key(key), || {
             let tapes = RateTapes::new(key)?;
@@ -212,7 +212,7 @@ fn keep(to: &mut Vec<f64>, numbers: &[f64]) {
 }
 
 impl TapeRates {
-    /// For so many members side by side.
+    /// The rates of `lanes` members side by side.
     pub fn new(rated: Arc<RateTapes>, spec: &Spec, level: Level, lanes: usize, clock: &Clock) -> TapeRates {
         let load = |stage: &Stage| {
             let compiled = stage.compiled_for_lanes(level, lanes);

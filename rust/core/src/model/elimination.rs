@@ -40,7 +40,7 @@ impl<N: Number> Factors<N> {
         self.solve_some(x.into_iter().map(Some).collect()).into_iter().flatten().collect()
     }
 
-    /// Solves for right-hand sides of which some are `None`: zero in every state. So are unknowns that are `None`.
+    /// Solves for right-hand sides. Those that are `None` are zero in every state, and so are unknowns that are `None`.
     pub(crate) fn solve_some(&self, mut x: Vec<Option<N>>) -> Vec<Option<N>> {
         let n = x.len();
         let less = |x: &mut [Option<N>], from: usize, factor: Option<N>, known: usize| {

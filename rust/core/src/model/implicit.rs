@@ -1,5 +1,5 @@
-//! What implicit methods need of a system: its Jacobian J at the start of a step, and the solution of (M − γhJ)·x = r, where M is
-//! its mass matrix, or that of units.
+//! The linear algebra of implicit methods: the Jacobian J of a system at the start of a step, and the solution of
+//! (M − γhJ)·x = r, where M is the mass matrix of the system, or the unit matrix.
 //!
 //! `reference/implicit.py` has the same operations in the same order.
 
@@ -25,7 +25,7 @@ pub(crate) struct Implicit<N: Number> {
 }
 
 impl<N: Number> Implicit<N> {
-    /// Of a system at a state; None of numbers, whose derivatives are not known.
+    /// Derives the rates of a system at a state; None for plain numbers, whose derivatives are not known.
     pub(crate) fn new(s: &dyn System<N>, t: N, h: N, v: &DVector<N>, y: &DVector<N>) -> Option<Implicit<N>> {
         let state: Vec<N> = v.iter().chain(y).copied().collect();
         let mut rates = || s.dv(t, v, y).iter().chain(&s.dy(t, v, y)).copied().collect();

@@ -101,7 +101,7 @@ impl<N: Number> Nearer<N> {
     }
 }
 
-/// G₀ … G₃, by so many terms of their series.
+/// G₀ … G₃, by `terms` terms of their series.
 fn stiefel<N: Number>(beta: N, s: N, terms: usize) -> [N; 4] {
     let of = N::of;
     let square = s * s;

@@ -20,9 +20,9 @@ pub struct Record {
     pub family: &'static str,
     /// The undamped oscillator is stable for Φ = ω₀T below this; 0 means never.
     pub limit: f64,
-    /// What it needs from a system.
+    /// Its requirements on a system.
     pub needs: Needs,
-    /// Its carry: what it keeps between steps in place of `v`, if anything.
+    /// Its carry: the block that it keeps between steps in place of `v`, if any.
     pub carry: Option<Carry>,
     /// Its estimate of the error of a step, if it has one: adaptive steps need it.
     pub estimate: Option<Estimate>,
@@ -42,7 +42,7 @@ pub(crate) type Blocks = fn(Rates, Time, Length, Block, Block) -> (Block, Block)
 /// A function from a state to blocks of v and y, one pair for each power.
 pub(crate) type Powers = fn(Rates, Time, Length, Block, Block) -> Vec<(Block, Block)>;
 
-/// What a method needs from a system.
+/// The requirements of a method on a system.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Needs {
     /// Nothing beyond the two increments.
@@ -51,7 +51,7 @@ pub enum Needs {
     Acceleration,
 }
 
-/// What a method keeps between steps in place of the velocity.
+/// The block that a method keeps between steps in place of the velocity.
 #[derive(Debug)]
 pub struct Carry {
     /// Its name.
@@ -81,24 +81,24 @@ pub struct Estimate {
 /// A fact about a method, to be shown.
 #[derive(Debug)]
 pub enum Fact {
-    /// Words.
+    /// A text.
     Text(&'static str),
-    /// Words that may not be there.
+    /// A text that may be missing.
     MaybeText(Option<&'static str>),
-    /// Several of them.
+    /// Several texts.
     Texts(&'static [&'static str]),
-    /// A whole number that may not be there.
+    /// A whole number that may be missing.
     Whole(Option<usize>),
     /// A number.
     Number(f64),
-    /// Several of them.
+    /// Several numbers.
     Numbers(Vec<f64>),
     /// Yes or no.
     Truth(bool),
 }
 
 impl Record {
-    /// All metadata, by their names in Python. Those that follow from the step itself are read from its program.
+    /// All metadata, by their names in Python. Some follow from the step itself and are read from its program.
     pub fn facts(&self) -> Vec<(&'static str, Fact)> {
         let program = self.program();
         vec![

@@ -15,7 +15,7 @@ use crate::error::Error;
 pub struct Method {
     /// The name that users read.
     pub name: &'static str,
-    /// What it needs from a system.
+    /// Its requirements on a system.
     pub needs: Needs,
     /// Whether it carries something in place of v between steps.
     pub carries: bool,
@@ -29,7 +29,7 @@ pub struct Method {
     attempt: Option<Program>,
     /// The coefficients of its continuous extension: results are those of v and of y, power by power.
     extension: Option<Program>,
-    /// Of each way to start the program that turns a velocity into what the v slot holds between steps, with the blocks that are
+    /// For each way to start the program that turns a velocity into what the v slot holds between steps, with the blocks that are
     /// kept behind it.
     starts: Vec<Program>,
     /// The inverses, which turn what the v slot holds into a velocity; none where it holds v.
@@ -55,8 +55,8 @@ impl From<&Record> for Method {
 }
 
 impl Method {
-    /// One that a user defines by its programs: a step, an attempt with the order of its estimate, and what makes the blocks that
-    /// are kept.
+    /// A method that a user defines by its programs: a step, an attempt with the order of its estimate, and the start of the
+    /// blocks that it keeps.
     pub fn own(
         name: &str,
         needs: Needs,
@@ -133,7 +133,7 @@ pub fn method(name: &str) -> Result<Arc<Method>, Error> {
     Err(Error::UnknownMethod { name: name.to_owned(), known })
 }
 
-/// Makes a method known by a key; what is known by it already stays.
+/// Registers a method under a key; one that is already there stays.
 pub fn define(key: &str, method: Method) {
     let mut own = Box::new(Own { key: key.to_owned(), method: Arc::new(method), later: OnceLock::new() });
     let mut place = &OWN;

@@ -1,4 +1,4 @@
-//! What is stepped, and how: systems and methods over any kind of number, and what is around a system.
+//! Models: systems and methods over any kind of number, and the parts around a system.
 
 pub mod around;
 mod elimination;

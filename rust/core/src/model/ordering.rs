@@ -69,8 +69,8 @@ pub(crate) struct Ordering {
 }
 
 impl Ordering {
-    /// Of a matrix by the columns of its rows: of the unknowns that are left, the next is the one, or the first of several, whose
-    /// rows have the fewest entries when each is as long as all of them together, as it is after exchanges that depend on
+    /// Orders a matrix by the columns of its rows: of the unknowns that are left, the next is the one, or the first of several,
+    /// whose rows have the fewest entries when each is as long as all of them together, as it is after exchanges that depend on
     /// numbers.
     pub(crate) fn new(mut rows: Vec<Columns>) -> Ordering {
         let mut left: Vec<usize> = (0..rows.len()).collect();

@@ -19,7 +19,7 @@ enum Exchange<N: Number> {
 }
 
 impl<N: Number> Exchange<N> {
-    /// Both entries after it.
+    /// Both entries after the exchange.
     fn of(&self, a: Entry<N>, b: Entry<N>) -> [Entry<N>; 2] {
         match self {
             Exchange::Always => [b, a],
@@ -36,7 +36,7 @@ impl<N: Number> Exchange<N> {
 pub(crate) struct Factors<N: Number> {
     /// The unknowns, in the order of their elimination.
     order: Vec<usize>,
-    /// Of each unknown the exchanges of its row with a later one, and the multiples of it that these lose.
+    /// For each unknown the exchanges of its row with a later one, and the multiples of it that these lose.
     exchanges: Vec<Vec<(usize, Exchange<N>)>>,
     below: Vec<Vec<(usize, N)>>,
     /// The rows, and the reciprocals of the entries on the diagonal.
@@ -45,7 +45,7 @@ pub(crate) struct Factors<N: Number> {
 }
 
 impl<N: Number> Factors<N> {
-    /// Of a matrix, by its rows. An unknown without a pivot has an infinite one in its place, or a NaN.
+    /// Factors a matrix, by its rows. An unknown without a pivot has an infinite one in its place, or a NaN.
     pub(crate) fn new(mut rows: Vec<Vec<Entry<N>>>) -> Self {
         let n = rows.len();
         let columns = |row: &Vec<Entry<N>>| (0..n).filter(|column| row[*column].is_some()).collect();

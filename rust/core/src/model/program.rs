@@ -42,7 +42,7 @@ impl Add<Length> for Time {
 }
 
 impl Time {
-    /// So many steps after the start.
+    /// The time `steps` steps after the start.
     pub fn after(steps: f64) -> Time {
         Time(steps)
     }
@@ -130,7 +130,7 @@ impl Entry {
         }
     }
 
-    /// The same of the blocks that are now at other places.
+    /// The entry with its blocks at their new places.
     fn moved(self, to: impl Fn(Block) -> Block) -> Entry {
         match self {
             Entry::V | Entry::Y | Entry::Kept(..) | Entry::ByTimeV | Entry::ByTimeY => self,
@@ -308,7 +308,7 @@ impl Program {
         Program { entries: recording.entries, results }.without_unused()
     }
 
-    /// Of entries that are known, each after what it reads; None if one reads what is not there.
+    /// A program of these entries, each after those that it reads; None if one reads another that is missing.
     pub fn of(entries: Vec<Entry>, results: Vec<usize>) -> Option<Program> {
         let begins = entries.len() >= 2 && entries[0] == Entry::V && entries[1] == Entry::Y;
         let reads = |(i, entry): (usize, &Entry)| entry.operands().iter().all(|operand| operand.index() < i);
@@ -317,8 +317,8 @@ impl Program {
         is_sound.then(|| Program { entries, results }.without_unused())
     }
 
-    /// The same without entries that no result is made of, such as a stage that counts only in an estimate of the error. The
-    /// state stays, at its place.
+    /// The program without entries that no result depends on, such as a stage that counts only in an estimate of the error.
+    /// The state stays, at its place.
     fn without_unused(self) -> Program {
         let mut used = vec![false; self.entries.len()];
         used[..2].fill(true);
@@ -399,7 +399,7 @@ impl Program {
         self.run_with(s, t, h, v, y, &[])
     }
 
-    /// The same of a method that keeps blocks between steps.
+    /// As `run`, for a method that keeps blocks between steps.
     pub(crate) fn run_with<N: Number>(
         &self,
         s: &dyn System<N>,

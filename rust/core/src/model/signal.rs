@@ -5,7 +5,7 @@ use crate::{functions::sin, tape::number::Number};
 /// An input of one member.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Signal<N: Number> {
-    /// The same at all times.
+    /// A constant.
     Constant(N),
     /// amplitude · sin(omega·t + phase)
     Sine {
@@ -22,7 +22,7 @@ pub(crate) enum Signal<N: Number> {
         table: u32,
         /// Its value at a time.
         sample: fn(u32, N) -> N,
-        /// What it is multiplied with.
+        /// The factor of its samples, if there is one.
         factor: Option<N>,
     },
     /// A polynomial between each two samples, of the time since the first of them.
@@ -33,7 +33,7 @@ pub(crate) enum Signal<N: Number> {
         degree: u32,
         /// The value of a table at a time.
         sample: fn(u32, N) -> N,
-        /// What it is multiplied with.
+        /// The factor of its samples, if there is one.
         factor: Option<N>,
     },
 }
@@ -55,7 +55,7 @@ impl<N: Number> Signal<N> {
         }
     }
 
-    /// The same input, times a factor.
+    /// The input, times a factor.
     #[must_use]
     pub(crate) fn scaled(&self, factor: N) -> Self {
         match *self {

@@ -60,8 +60,8 @@ impl Table<'_> {
     }
 }
 
-/// Which of so many samples holds at a time: the last one not after it, or the first or last one outside; the first if the time
-/// is a NaN. As `reference/signal.py` has it.
+/// The number of the sample that holds at a time: the last one not after it, or the first or last one outside; the first if the
+/// time is a NaN. As `reference/signal.py` has it.
 pub(crate) fn holds_at(t: f64, start: f64, interval: f64, samples: usize) -> usize {
     let number = ((t - start) / interval * HOLD_SLACK).floor();
     if number > 0.0 { (number as usize).min(samples - 1) } else { 0 }
@@ -86,7 +86,7 @@ pub struct Signature {
     pub equations: Option<Arc<Equations>>,
     /// Quantities whose changes of sign are noticed, each with its direction as its name.
     pub watched: Option<Arc<Equations>>,
-    /// What a sampled controller computes: the parameters that it sets, and its next state.
+    /// The computation of a sampled controller: the parameters that it sets, and its next state.
     pub controller: Option<Arc<Equations>>,
 }
 
@@ -115,7 +115,7 @@ impl Signature {
         find(&self.rows, name).map_or(0, Vec::len)
     }
 
-    /// An error unless the parameter of that name has so many rows.
+    /// An error unless the parameter of that name has `expected` rows.
     pub(crate) fn expect(&self, what: &'static str, expected: usize) -> Result<(), Error> {
         let got = self.count(what);
         if got == expected { Ok(()) } else { Err(Error::Shape { what, expected, got }) }
@@ -154,7 +154,7 @@ impl Signature {
     }
 }
 
-/// Which system, with which parameters.
+/// A system with its parameters and inputs.
 #[derive(Clone, Debug, Default)]
 pub struct Spec<'a> {
     /// Names and counts.

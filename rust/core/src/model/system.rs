@@ -129,14 +129,14 @@ pub struct Gradient<N: Number> {
 pub struct Friction<N: Number> {
     /// For each vector, or for one number.
     pub limit: Block<N>,
-    /// What these are.
+    /// The velocities that it acts on.
     pub on: On<N>,
 }
 
 /// The velocities that friction acts on.
 #[derive(Clone, Debug)]
 pub enum On<N: Number> {
-    /// Vectors of so many numbers each.
+    /// Vectors of this many numbers each.
     Vectors(usize),
     /// The number at that place, and by how much others change where it changes by 1; nothing if they do not.
     One(usize, Block<N>),

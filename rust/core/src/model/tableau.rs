@@ -17,7 +17,7 @@ impl Tableau {
         self.stages_after(Vec::with_capacity(self.nodes.len()), s, t, h, v, y)
     }
 
-    /// Those and others before them, on which they may depend.
+    /// The increments of all stages, after others that come before them and on which they may depend.
     pub(crate) fn stages_after(
         &self,
         mut found: Vec<(Block, Block)>,

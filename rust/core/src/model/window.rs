@@ -1,8 +1,8 @@
-//! What a step of fixed length sees of an input that holds its samples: their mean over the step.
+//! The mean over a step of fixed length of an input that holds its samples.
 //!
 //! A step that evaluated such an input at its own end would see the next sample, and one within which a sample begins would see
 //! it from the next of its evaluations on; either makes every method one of first order. The mean does not: where samples begin
-//! with steps it is the sample itself, and elsewhere what is lost is of second order in the step.
+//! with steps it is the sample itself, and elsewhere the error is of second order in the step.
 
 use std::cell::RefCell;
 
@@ -16,7 +16,7 @@ use crate::tape::{
 /// The ends of a stretch of time, and its length.
 pub(crate) type Window<N> = [N; 3];
 
-/// What of a length leads back in time, and what leads on; one of them is zero.
+/// The parts of a length that lead back in time, and on; one of them is zero.
 fn ways<N: Number>(h: N) -> [N; 2] {
     let zero = N::of(0.0);
     let back = N::choose(h.below(zero), h, zero);
@@ -37,7 +37,7 @@ pub(crate) fn of_slot<N: Number>(t: N, h: N) -> Window<N> {
     [t - on, t - back, on - back]
 }
 
-/// The mean over a window that begins with one sample and ends with another, or the same, which began at that time.
+/// The mean over a window from the sample `before` to the sample `after`, or the same one, which began at time `began`.
 pub(crate) fn mean<N: Number>([_, to, length]: Window<N>, began: N, before: N, after: N) -> N {
     let (zero, one) = (N::of(0.0), N::of(1.0));
     let share = (to - began) / length;
@@ -46,7 +46,7 @@ pub(crate) fn mean<N: Number>([_, to, length]: Window<N>, began: N, before: N, a
     before + share * (after - before)
 }
 
-/// Whether a table holds samples of which a step sees the mean: the one after it says when they begin.
+/// Whether a table holds samples that a step averages: the table after it says when they begin.
 pub(crate) fn is_held(signature: &Signature, table: usize) -> bool {
     belongs(signature, table, table + 1, ".times")
 }
@@ -60,11 +60,11 @@ fn belongs(signature: &Signature, first: usize, table: usize, part: &str) -> boo
 /// How a table is looked up.
 #[derive(Clone, Copy, PartialEq)]
 enum Lookup {
-    /// At a time.
+    /// The sample at a time.
     AtTime,
-    /// By its mean, at times as they are.
+    /// The mean over the window, at times as they are.
     Mean,
-    /// By its mean, at times that count from one of each member, which is in the table behind that of times.
+    /// The mean, at times that count from one of each member, which is in the table behind that of times.
     MeanSince,
 }
 

@@ -40,8 +40,8 @@ const MIN_MEMBERS_FOR_THREADS: usize = 256;
 /// Operations of a run, by lanes, that takes some tenths of a millisecond.
 const MOST_OPERATIONS: usize = 1 << 21;
 
-/// Makes the run, and returns whether it did: where members stand at the start is not found for a system whose attempt is not one
-/// tape. The monitor is as that of [`crate::run::fixed::run`].
+/// Runs all members. Returns false, having done nothing, if an attempt is not a single tape: the caller then supplies the
+/// controllers' initial state. The monitor is as that of [`crate::run::fixed::run`].
 pub fn run(plan: &AdaptiveRun, arrays: Arrays, monitor: &mut dyn FnMut(f64) -> bool) -> Result<bool, Error> {
     let b = plan.members;
     let traced = plan.model.traced()?;
@@ -99,12 +99,12 @@ pub fn run(plan: &AdaptiveRun, arrays: Arrays, monitor: &mut dyn FnMut(f64) -> b
 /// Members in lanes, which are made once for runs that differ in their start alone.
 pub struct Prepared {
     group: Option<Box<dyn AdaptiveBatch>>,
-    /// After so many calls of the monitor a run takes longer than others wait for.
+    /// A run that polls the monitor more often is too long to hold the lock.
     most_checks: usize,
 }
 
 impl Prepared {
-    /// For runs such as this one, by one thread; None if where members stand at the start is to be found by others.
+    /// Prepares runs such as this one, by one thread; None if the caller must supply the controllers' initial state.
     pub fn new(plan: &AdaptiveRun) -> Result<Option<Self>, Error> {
         let traced = plan.model.traced()?;
         plan.model.room(traced.shape, 1)?;
@@ -119,7 +119,7 @@ impl Prepared {
         self.group.as_mut().is_some_and(|group| group.renew(spec))
     }
 
-    /// Makes the run, and returns whether it did: not if it takes long.
+    /// Runs all members. Returns false if that takes long.
     pub fn run(&mut self, plan: &AdaptiveRun, arrays: Arrays) -> Result<bool, Error> {
         let Some(group) = self.group.take() else { return Ok(false) };
         let mut worker = Worker::of(plan, group);
@@ -148,7 +148,7 @@ struct Worker<'a> {
     sums: Vec<[f64; SIDE]>,
     /// The times to keep the state at, if they are those of all members, and some behind them that never come.
     times: Vec<f64>,
-    /// Where events are looked for.
+    /// The event search, if there are events.
     looks: Option<Looks<'a>>,
 }
 
@@ -270,7 +270,7 @@ impl<'a> Worker<'a> {
         most.min(self.attempts_to_next_kept(assignments))
     }
 
-    /// After how many attempts a member may have made a step that is kept.
+    /// Attempts after which a member may have made a step that is kept.
     fn attempts_to_next_kept(&self, assignments: &[Option<Assignment>]) -> usize {
         let every = self.plan.every;
         if every == 0 {
@@ -305,7 +305,7 @@ impl<'a> Worker<'a> {
         assigned.accepted_steps == part.steps[0].rows()
     }
 
-    /// Attempts of all members one by one, keeping where they stand before the first and after each.
+    /// Makes attempts of all members one by one, keeping where they stand before the first and after each.
     fn attempt_log(&mut self, mut part: Part, go_on: GoOn) -> Result<(), Error> {
         let (lanes, rows) = (self.group.lanes(), self.plan.at.len());
         let of_time = self.plan.v.len() + self.plan.y.len() + Pace::<f64>::PLACES[0];
@@ -347,7 +347,7 @@ impl<'a> Worker<'a> {
         Ok(())
     }
 
-    /// Keeps where all lanes stand, the first of which has this member.
+    /// Logs the states of all lanes, the first of which has member `first`.
     fn note(&self, part: &mut Part, first: usize, row: usize) {
         let (p, q, rows) = (self.plan.v.len(), self.plan.y.len(), self.plan.at.len());
         let members = first..part.count.min(first + self.group.lanes());
@@ -430,7 +430,7 @@ impl<'a> Worker<'a> {
         self.group.set_scales(lane, &scales);
         self.waypoints.expect_after(pace.accepted);
         if let Some(looks) = &mut self.looks {
-            // A held step was looked at before, up to the last time of the run that goes on.
+            // An earlier run checked a held step up to its last time.
             looks.begin(lane, at, if pace.held > 0.0 { pace.target } else { f64::NEG_INFINITY });
             let end = plan.at.last().map_or(f64::NAN, |row| row.at(at));
             looks.begin_course((lane, at), [pace.t, end], plan.begins.then_some(&state));
@@ -576,7 +576,7 @@ impl<'a> Worker<'a> {
         Ok(None)
     }
 
-    /// Of a step that is held and whose coefficients are known: saves the state at the next time within it, or takes it.
+    /// In a held step with known coefficients, saves the state at the next time within it, or takes the step.
     fn go_by_terms(&mut self, part: &mut Part, lane: usize, assigned: &mut Assignment, mut pace: Pace<f64>) {
         let (spec, member) = (&self.plan.model.spec, part.first + assigned.member);
         if !pace.holds() {
@@ -603,9 +603,8 @@ impl<'a> Worker<'a> {
         self.group.set_state(lane, &origin);
     }
 
-    /// Of a lane at the start of a held step: saves the state of the extra step that it has made, and sets the next one, or lets
-    /// the held step be taken. Does what [`Self::update_lane`] does, and moves nothing else. Returns false where that has more to
-    /// do.
+    /// At the start of a lane's held step, saves the state of the extra step that it has made, and sets the next one, or lets the
+    /// held step be taken. Does what [`Self::update_lane`] does, and moves nothing else. Returns false where that has more to do.
     fn go_within(&mut self, part: &mut Part, lane: usize, assigned: &mut Assignment) -> bool {
         let (p, n, made) = (self.plan.v.len(), self.plan.v.len() + self.plan.y.len(), assigned.origin.is_some());
         let Pace { t, h, target: until, extra, held, wall, rejected, .. } = self.places;
@@ -644,7 +643,7 @@ impl<'a> Worker<'a> {
         true
     }
 
-    /// Counts so many extra steps of a lane.
+    /// Counts `steps` extra steps of a lane.
     fn count_extra(&mut self, lane: usize, steps: usize) {
         match self.group.row_mut(self.places.extra_steps) {
             Some(row) => row[lane] += steps as f64,
@@ -655,8 +654,7 @@ impl<'a> Worker<'a> {
         }
     }
 
-    /// Saves the states of a lane at times before the end of a step whose start was kept, as sums of its coefficients. Returns
-    /// how many.
+    /// Saves the states of a lane at times within a step whose start was kept, as sums of its coefficients. Returns how many.
     fn save_sums(&mut self, part: &mut Part, lane: usize, assigned: &mut Assignment, end: f64) -> usize {
         let (plan, member, first) = (self.plan, part.first + assigned.member, assigned.next);
         let mut states = std::mem::take(&mut self.sums);

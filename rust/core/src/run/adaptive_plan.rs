@@ -1,4 +1,4 @@
-//! What a run of adaptive steps is made from, what it fills, and the shares of both that a thread and a lane work on.
+//! The input and output of a run of adaptive steps, and the shares of both that a thread and a lane work on.
 
 use super::{
     Model,
@@ -13,16 +13,16 @@ use crate::{
 /// A run to be made.
 #[derive(Clone, Debug)]
 pub struct AdaptiveRun<'a> {
-    /// What to step, and how.
+    /// The system and the method.
     pub model: Model<'a>,
-    /// What hot loops may use.
+    /// The instruction set and threads of hot loops.
     pub machine: Machine,
     /// Times to keep the state at, ascending, by rows.
     pub at: Vec<Row<'a>>,
     /// The times that no step crosses, by rows: those just before each, ascending, and behind them those just after.
     pub jumps: Vec<Row<'a>>,
-    /// The members' paces at the start, by rows, in the order of [`crate::step::pace::Pace::numbers`], and what stands behind
-    /// them.
+    /// The members' paces at the start, by rows, in the order of [`crate::step::pace::Pace::numbers`], and after them
+    /// their scales: group sizes and tolerances.
     pub paces: Vec<Row<'a>>,
     /// Whether the steps to try first and the lengths of the blocks are still to be found: see `Pace::begun`.
     pub begins: bool,
@@ -32,7 +32,7 @@ pub struct AdaptiveRun<'a> {
     pub is_part: bool,
     /// The most attempts of a member.
     pub budget: i64,
-    /// Every so manieth accepted step is kept in [`Arrays::steps`]; 0 for none. A member that has filled its rows there ends,
+    /// Every `every`-th accepted step is kept in [`Arrays::steps`]; 0 for none. A member that has filled its rows there ends,
     /// with a status of its own, and can go on from its pace.
     pub every: i64,
     /// Velocities at the start, by rows.
@@ -41,7 +41,7 @@ pub struct AdaptiveRun<'a> {
     pub y: Vec<Row<'a>>,
     /// How many members.
     pub members: usize,
-    /// What is looked for in the steps.
+    /// The events to look for.
     pub events: Option<&'a Events<'a>>,
 }
 
@@ -50,7 +50,7 @@ pub struct AdaptiveRun<'a> {
 pub(super) enum Status {
     /// Its rows of [`Arrays::steps`] are full.
     Full = -1,
-    /// At the last time.
+    /// It came to the last time.
     Ok = 0,
     /// Out of attempts.
     Budget = 2,
@@ -60,7 +60,7 @@ pub(super) enum Status {
     NotFinite = 4,
 }
 
-/// What a run fills: arrays of rows of one number per member.
+/// The output of a run: arrays of rows of one number per member.
 #[derive(Debug)]
 pub struct Arrays<'a> {
     /// The states at the output times; NaN from where a member stopped.
@@ -69,7 +69,7 @@ pub struct Arrays<'a> {
     pub saved_y: &'a mut [f64],
     /// Rows of the members' states at the end, v and y: those before the step that contains the last output time.
     pub state: &'a mut [f64],
-    /// Their paces at the end, by rows.
+    /// The members' paces at the end, by rows.
     pub paces: &'a mut [f64],
     /// One row: the status.
     pub status: &'a mut [i64],
@@ -146,28 +146,27 @@ impl<'a> Arrays<'a> {
     }
 }
 
-/// Which member of the part a lane steps, and which of the saved times is next.
+/// The member of the part that a lane steps, and the next of the saved times.
 pub(super) struct Assignment {
     pub(super) member: usize,
     pub(super) next: usize,
-    /// While an extra step is made: the state that it starts from, which has to be put back, and how many attempts were rejected
-    /// before.
+    /// While an extra step is made: the state that it starts from, to be put back, and how many attempts were rejected before.
     pub(super) origin: Option<(Vec<f64>, f64)>,
     /// A run that goes on is held, and the coefficients of its series have to be found first.
     pub(super) held_before: bool,
-    /// How many accepted steps it had when a step was looked at last, and how many are kept of this run.
+    /// How many accepted steps it had at the last check of a step, and how many are kept of this run.
     pub(super) accepted: f64,
     pub(super) accepted_steps: usize,
-    /// How many accepted steps it had when a waypoint was looked for last.
+    /// How many accepted steps it had at the last check for a waypoint.
     pub(super) passed: u64,
-    /// States within the step that comes next, or is held, are made by steps.
+    /// Whether states within the step that comes next, or is held, are made by steps.
     pub(super) by_steps: bool,
     /// Where an event stops it.
     pub(super) stop: Option<Stop>,
 }
 
 impl Assignment {
-    /// Of a member of the log of attempts.
+    /// The assignment of a member in the log of attempts.
     pub(super) fn of_log(member: usize, next: usize) -> Assignment {
         Assignment {
             member,

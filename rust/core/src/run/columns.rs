@@ -11,13 +11,13 @@ impl<T: Copy> Columns<'_, T> {
         self.0.nrows()
     }
 
-    /// So many rows from the `first`-th on, one after the other, if it has all columns.
+    /// The `rows` rows from the `first`-th on, one after the other, if this part has all columns.
     pub(crate) fn whole(&mut self, first: usize, rows: usize) -> Option<&mut [T]> {
         let width = self.0.ncols();
         self.0.as_slice_mut()?.get_mut(first * width..(first + rows) * width)
     }
 
-    /// Puts so many columns of an array of that width into one column, one behind the other from that row on.
+    /// Puts the first `count` columns of an array of that width into one column, one behind the other from row `first` on.
     pub(crate) fn put(&mut self, column: usize, first: usize, count: usize, numbers: &[T], width: usize) {
         let behind = numbers.len() / width;
         if behind == 0 {

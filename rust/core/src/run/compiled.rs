@@ -38,8 +38,7 @@ pub struct Compiled {
     pub bytes: usize,
     /// The most values that are spilled at once because there are not enough registers.
     pub spills: usize,
-    /// Of a single member's machine code: whether equal operations are lanes of one vector, and what the model says of that; none
-    /// where it was not considered.
+    /// Whether equal operations of a single member are lanes of one vector, and the model's verdict; none where not considered.
     pub packing: Option<(bool, Verdict)>,
     /// How long tracing took, with cutting, and everything that is run once in a while.
     pub trace: Duration,
@@ -47,7 +46,7 @@ pub struct Compiled {
     pub compile: Duration,
 }
 
-/// Why a step is interpreted.
+/// The reason why a step is interpreted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Interpreted {
     /// At this level no machine code is written: this CPU has no writer, or the interpreter was requested.
@@ -69,8 +68,8 @@ impl Interpreted {
     }
 }
 
-/// Of how many steps a run is whose step is explained: of very many, but where these would be one tape for the equations of a
-/// large system, whose listing has some ten thousand lines.
+/// Steps of the run whose step is explained: very many, unless these would be one tape for the equations of a large system,
+/// whose listing has some ten thousand lines.
 fn explained_steps(traced: &Traced) -> f64 {
     if traced.solves_rows { MIN_SOLUTIONS - 1.0 } else { f64::INFINITY }
 }
@@ -82,7 +81,7 @@ fn counts(body: &Body) -> Counts {
 }
 
 impl Model<'_> {
-    /// Traces and compiles the step anew, for so many members; none if it is too long for one tape.
+    /// Traces and compiles the step anew, for `members` members; none if it is too long for one tape.
     pub fn compiled(&self, machine: Machine, members: usize) -> Result<Option<Compiled>, Error> {
         let traced = self.traced()?;
         if !matches!(self.way(&traced, machine, members, explained_steps(&traced)), StepStrategy::Tape) {

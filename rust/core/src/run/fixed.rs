@@ -24,30 +24,29 @@ use crate::{
 /// A run to be made.
 #[derive(Clone, Debug)]
 pub struct FixedRun<'a> {
-    /// What to step, and how.
+    /// The system and the method.
     pub model: Model<'a>,
     /// Time and step.
     pub clock: Clock,
-    /// What hot loops may use.
+    /// The instruction set and threads of hot loops.
     pub machine: Machine,
     /// Number of the first step.
     pub first: i64,
-    /// How many steps.
-    /// None where only quantities of the states are recorded.
+    /// Number of steps; 0 to record quantities of the given states only.
     pub steps: i64,
-    /// Keep every so many steps, the first state and the last; or the last alone.
+    /// Save every `every`-th step, the first state and the last; or the last alone.
     pub every: Option<i64>,
-    /// The v slot at the first step, by rows; behind them what the method keeps, if `carried`.
+    /// The v slot at the first step, by rows; after them the blocks that the method keeps, if `carried`.
     pub v: Vec<Row<'a>>,
     /// The coordinates at the first step, by rows.
     pub y: Vec<Row<'a>>,
     /// How many members.
     pub members: usize,
-    /// The v slot holds what the method carries already, and what it keeps is known: do not start.
+    /// The v slot holds the carry already, and the blocks that the method keeps are known: do not start.
     pub carried: bool,
     /// How many members have parameters of their own; those of further members repeat them.
     pub own: usize,
-    /// What is looked for in the steps.
+    /// The events to look for.
     pub events: Option<&'a Events<'a>>,
 }
 
@@ -58,18 +57,18 @@ impl FixedRun<'_> {
     }
 }
 
-/// What a run fills: arrays of rows of one number per member.
+/// The output of a run: arrays of rows of one number per member.
 #[derive(Debug)]
 pub struct Arrays<'a, T = f64> {
-    /// What is kept of v, one block per kept step.
+    /// The saved v, one block per saved step.
     pub saved_v: &'a mut [T],
-    /// What is kept of y.
+    /// The saved y.
     pub saved_y: &'a mut [T],
-    /// What is recorded beside each saved state.
+    /// The quantities recorded beside each saved state.
     pub recorded: &'a mut [T],
-    /// What the systems added up, and what is watched, rows of one number per member; empty if not asked for.
+    /// The sums over the steps and the watched quantities, rows of one number per member; empty if not asked for.
     pub tally: &'a mut [T],
-    /// The v slot at the end, and what the method keeps; empty if not asked for.
+    /// The v slot at the end, and the blocks that the method keeps; empty if not asked for.
     pub carry: &'a mut [T],
     /// Per member, the number of the first step that is not finite, or −1; members that have one are not checked.
     pub first_bad: &'a mut [i64],
@@ -87,8 +86,8 @@ pub fn kept(steps: i64, every: Option<i64>) -> usize {
 
 /// The most steps between two checks of the clock and of whether all states are finite.
 const DIVERGENCE_CHECK_INTERVAL: i64 = 1 << 16;
-/// Operations until the first check, about, and steps at most: until then it is not known how long an operation takes.
-/// Interpreted, so many take some milliseconds.
+/// Operations until the first check, about, and steps at most: until then the time of an operation is not known. Interpreted,
+/// this many take some milliseconds.
 const OPERATIONS_TO_FIRST_CHECK: usize = 1 << 22;
 const STEPS_TO_FIRST_CHECK: i64 = 1 << 14;
 /// Numbers × steps between two later checks, at most.
@@ -96,14 +95,14 @@ const NUMBERS_BETWEEN_CHECKS: i64 = 1 << 23;
 /// A group of more numbers than this is first checked after one step, to see how long that takes: the cost of a step of many
 /// bodies grows faster than their numbers.
 const LARGE_MEMBER_NUMBERS: i64 = 1 << 16;
-/// If a member diverged between two checks, the steps between them are repeated with so many checks in between, and so on.
+/// If a member diverged between two checks, the steps between them are repeated with this many checks in between, and so on.
 const RETRACE_INTERVALS: i64 = 16;
 /// Numbers × steps below which a second thread costs more time than it saves.
 pub const MIN_NUMBER_STEPS_FOR_THREADS: f64 = 3e6;
 
 /// Numbers that groups step.
 pub trait Steppable: Traceable {
-    /// A group for a run of so many members, and of so many steps of members in all.
+    /// A group for a run of `members` members, and of `steps` steps of members in all.
     fn group(
         model: &Model,
         traced: &Traced,
@@ -113,7 +112,7 @@ pub trait Steppable: Traceable {
         steps: f64,
     ) -> Result<Box<dyn Group<Self>>, Error>;
 
-    /// Makes so many steps from the k-th on, and looks for events in them. Of each kind of number, so that this is compiled once.
+    /// Makes `steps` steps from the k-th on and looks for events in them. A method of the number, so that it is compiled once.
     fn look(looks: &mut Looks, on: &mut Stepped<Self>, k: i64, steps: i64);
 }
 
@@ -235,15 +234,18 @@ pub fn run<T: Steppable>(plan: &FixedRun, arrays: Arrays<T>, monitor: &mut dyn F
     workers::share(parts, &workers, monitor, worker(), || Ok(worker()), Worker::part)
 }
 
-/// Both slots, what the method keeps and the tally at the last check, and buffers for the carry, while the v slot holds
-/// velocities, and for recorded quantities.
+/// State at the last check, to return to; and scratch buffers.
 #[derive(Default)]
 struct Good<T> {
+    /// The slots at the last check.
     v: Vec<T>,
     y: Vec<T>,
+    /// The blocks that the method keeps, and the sums over the steps, at the last check.
     kept: Vec<T>,
     tally: Vec<T>,
+    /// The carry, while the v slot holds velocities.
     carried: Vec<T>,
+    /// The recorded quantities of a state.
     recorded: Vec<T>,
     /// The state before unrolled steps.
     before: Vec<T>,
@@ -254,7 +256,7 @@ struct Worker<'a, T: Real> {
     plan: &'a FixedRun<'a>,
     traced: &'a Arc<Traced>,
     machine: Machine,
-    /// For as many members as there are, and for those that fill no group of these, with their number.
+    /// Groups of as many members as fit, and for the rest that fills no such group, with its number of members.
     full: Option<Box<dyn Group<T>>>,
     rest: Option<(usize, Box<dyn Group<T>>)>,
     good: Good<T>,
@@ -268,7 +270,7 @@ impl<'a, T: Steppable> Worker<'a, T> {
         Worker { plan, traced, machine, full: None, rest: None, good: Good::default(), watch, stop }
     }
 
-    /// The group for so many members that are left, of so many lanes as fit if not all are taken at once.
+    /// The group for the `left` members that are left, of as many lanes as fit if not all are taken at once.
     fn group(&mut self, left: usize, lanes: usize) -> Result<&mut dyn Group<T>, Error> {
         let make = |members| -> Result<Box<dyn Group<T>>, Error> {
             let mut group = T::group(&self.plan.model, self.traced, self.machine, members, &self.plan.clock, self.plan.total())?;
@@ -332,7 +334,7 @@ struct Checks {
 /// One group's run.
 struct Job<'a, 'b, 'w, 'e, T: Real> {
     plan: &'a FixedRun<'a>,
-    /// Where events are looked for.
+    /// The event search, if there are events.
     looks: Option<Looks<'w, 'e>>,
     /// The v slot holds something else than v between steps: finish before keeping it.
     carries: bool,
@@ -491,7 +493,7 @@ impl<T: Steppable> Job<'_, '_, '_, '_, T> {
         y.iter().enumerate().for_each(|(row, x)| self.part.saved_y.row(i * q + row)[column] = T::of(*x));
     }
 
-    /// What the method would carry from there on is not known.
+    /// Marks the carry of a member as unknown: it ended at an event.
     fn forget_carry(&mut self, column: usize) {
         (0..self.part.carry.rows()).for_each(|row| self.part.carry.row(row)[column] = T::of(f64::NAN));
     }
@@ -631,7 +633,7 @@ impl<T: Steppable> Job<'_, '_, '_, '_, T> {
 
     /// Infinities and NaN persist in the slots, so it is enough to check at intervals. Velocities that are computed from a
     /// method's carry may be infinite and later finite again, but only if its numbers are [`Real::HUGE`].
-    /// Where events change states, they are looked at while these happen.
+    /// Where events change states, states are checked as these happen.
     fn is_suspect(&self) -> bool {
         if self.looks.as_ref().is_some_and(|looks| looks.changes()) {
             return false;

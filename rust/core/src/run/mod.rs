@@ -46,12 +46,12 @@ use crate::{
 pub struct Model<'a> {
     /// The system with its numbers.
     pub spec: Spec<'a>,
-    /// What its tapes depend on.
+    /// The key of its tapes.
     pub key: TapeKey,
 }
 
 impl Model<'_> {
-    /// An error if there is no memory for what so many threads keep of a system beside the results. This is checked before the
+    /// An error if there is no memory for what each of `threads` threads keeps beside the results. This is checked before the
     /// run, because an allocation that fails in the middle would abort the process.
     pub(crate) fn room(&self, shape: Shape, threads: usize) -> Result<(), Error> {
         let samples = self.spec.tables.iter().map(|table| table.samples.len()).sum::<usize>();
@@ -66,7 +66,7 @@ impl Model<'_> {
         self.key.traced()
     }
 
-    /// How so many members are stepped, if `steps` steps of members are to be made in all.
+    /// The way in which `members` members are stepped, if `steps` steps of members are to be made in all.
     fn way(&self, traced: &Traced, machine: Machine, members: usize, steps: f64) -> StepStrategy {
         let (rates, step) = traced.operations;
         let single = members == 1;
@@ -114,7 +114,7 @@ impl Model<'_> {
         }
     }
 
-    /// How many members a group steps together in a run of so many, and of so many steps of members in all.
+    /// Members that a group steps together in a run of `members` members and `steps` steps of members in all.
     pub fn lanes<T: Traceable>(&self, traced: &Traced, machine: Machine, members: usize, steps: f64) -> Result<usize, Error> {
         Ok(match self.way(traced, machine, members, steps) {
             StepStrategy::Tape => traced.tapes_of::<T>()?.step.compiled(machine.level, members).runner.lanes(),
@@ -128,7 +128,7 @@ impl Model<'_> {
         RatesRequest { signature: &self.key.signature, shape: traced.shape, record: &self.key.record, machine, h, attempts }
     }
 
-    /// A group that steps it, in a run of so many members and of so many steps of members in all.
+    /// A group that steps the model, in a run of `members` members and `steps` steps of members in all.
     pub(crate) fn group(
         &self,
         traced: &Traced,
@@ -204,7 +204,7 @@ const UNCHECKED_BYTES: usize = 1 << 24;
 enum StepStrategy {
     /// One tape for the whole step.
     Tape,
-    /// Tapes for the rates, with so many lanes.
+    /// Tapes for the rates, with this many lanes.
     Rates(usize),
     /// A kernel that is written by hand, for a single member.
     HandWrittenRates(HandWrittenRates),
@@ -216,15 +216,15 @@ enum StepStrategy {
 /// the rates: as fast as one tape, and sooner there.
 const HAND_WRITTEN_OPERATIONS: usize = 4000;
 /// A tape that solves many equations takes some microseconds an operation to trace and to write, and a third of a nanosecond less
-/// in a step than solving over rows: it is worth it from so many steps of members on.
+/// in a step than solving over rows: it is worth it from this many steps of members on.
 const MIN_SOLUTIONS: f64 = 20_000.0;
-/// So many attempts of a member with adaptive steps are expected.
+/// Attempts that are expected of a member with adaptive steps.
 const ATTEMPTS: f64 = 300.0;
 /// Operations of the matrix form from which on a hand-written kernel is faster than a tape, for a single member.
 const SINGLE_MATRIX_OPERATIONS: usize = 2 * 9 * 9;
-/// The same for several members, one by one.
+/// Likewise for several members, one by one.
 const MATRIX_OPERATIONS: usize = 2 * 24 * 24;
-/// Tapes of rates are worth compiling from so many evaluations, by all members together, for each of their operations on.
+/// Tapes of rates are worth compiling from this many evaluations, by all members together, for each of their operations on.
 const MIN_EVALUATIONS_PER_OPERATION: usize = 1;
-/// Up to so many members of a large system are as fast one by one as side by side.
+/// Up to this many members of a large system are as fast one by one as side by side.
 const MAX_SEQUENTIAL_MEMBERS: usize = 4;

@@ -10,10 +10,10 @@ use crate::{
     },
 };
 
-/// What a run is made of, whole.
+/// All parts of a run.
 pub struct Stages {
-    /// How many numbers of a member v and y have, what the method keeps and a controller remembers behind them, how many of these
-    /// a controller remembers, what is summed up behind that, and what is recorded.
+    /// Numbers per member: of v and y, kept by the method (a controller's memory among them), of this memory, summed up over the
+    /// steps, and recorded.
     pub sizes: [(&'static str, usize); 6],
     /// Whether the method has a carry instead of v between steps.
     pub carries: bool,

@@ -7,11 +7,11 @@ use super::{
 };
 use crate::{group::AdaptiveBatch, step::pace::Pace};
 
-/// The first waypoint is that of so many accepted steps.
+/// The number of accepted steps at the first waypoint.
 const FIRST: u64 = 256;
-/// The count of accepted steps of a waypoint of which the state before it is known so far.
+/// The count of accepted steps of a waypoint while only the state before it is known.
 const ON_THE_WAY: f64 = -1.0;
-/// So many are kept, the last ones.
+/// Waypoints that are kept, the last ones.
 pub(super) const WAYPOINTS: usize = 2;
 
 /// How many accepted steps are left to the next state that is kept: those before and after the step to a waypoint.
@@ -62,17 +62,17 @@ pub(super) struct WaypointSearch {
 }
 
 impl WaypointSearch {
-    /// For states of so many numbers.
+    /// A search in states of `numbers` numbers.
     pub(super) fn new(numbers: usize) -> Self {
         WaypointSearch { attempts_to_next: 1, count: numbers + Pace::<f64>::ACCEPTED }
     }
 
-    /// Looks in time for the next waypoint of a lane that has accepted so many steps.
+    /// Looks in time for the next waypoint of a lane that has accepted `accepted` steps.
     pub(super) fn expect_after(&mut self, accepted: f64) {
         self.attempts_to_next = self.attempts_to_next.min(steps_to_next(accepted));
     }
 
-    /// Makes so many attempts of every lane, and keeps where lanes stand that come to a waypoint or to a step before one.
+    /// Makes `attempts` attempts in every lane, and keeps the states of lanes that come to a waypoint or to a step before one.
     pub(super) fn attempt(
         &mut self,
         group: &mut dyn AdaptiveBatch,

@@ -1,4 +1,4 @@
-//! The threads of a run share its parts. The caller's monitor is told the progress and may stop the run.
+//! The threads of a run share its parts. The caller's monitor gets the progress and may stop the run.
 
 use std::{
     sync::{
@@ -17,7 +17,7 @@ use crate::{error::Error, stage::Stop};
 /// The longest time between two calls of the caller's monitor.
 pub(crate) const POLL: Duration = Duration::from_millis(20);
 
-/// So much memory must be left for a thread to be started: for its stack, 2 MiB, and for what it and the others allocate.
+/// Memory that must be left for a thread to be started: for its stack, 2 MiB, and for what it and the others allocate.
 const ROOM_FOR_A_THREAD: usize = 16 << 20;
 
 /// Is called with the amount of work done since the last call; returns whether to continue.
@@ -40,7 +40,7 @@ pub(crate) struct Workers {
 /// Does all parts. `mine` is the state of the first worker, `worker` makes those of the others.
 ///
 /// The monitor is called on this thread some dozens of times a second with the fraction of the total that is done. When it
-/// returns false, all threads are told to stop.
+/// returns false, all threads stop.
 pub(crate) fn share<P: Send, W: Send>(
     parts: Vec<P>,
     workers: &Workers,

@@ -26,8 +26,8 @@ struct Share<T> {
     group: Box<dyn Group<T>>,
     first: usize,
     count: usize,
-    /// Both slots, and what the method keeps, before the step that is being made, if that can be stopped, and before the one that
-    /// was made last.
+    /// The slots, and the blocks that the method keeps, before the step that is being made, if that can be stopped, and before
+    /// the last one.
     before: [Vec<T>; 2],
 }
 
@@ -47,7 +47,7 @@ impl<T: Real> Share<T> {
     }
 }
 
-/// Everything that a step needs, made once; a step allocates nothing and checks nothing.
+/// A prepared loop: a step allocates nothing and checks nothing.
 pub struct World<T = f64> {
     clock: Clock,
     shares: Vec<Share<T>>,
@@ -55,9 +55,9 @@ pub struct World<T = f64> {
     sizes: (usize, usize),
     /// Whether the method has a carry, or keeps blocks beside the state.
     carries: bool,
-    /// How many numbers all members have that it keeps, and that a sampled controller remembers.
+    /// Numbers of all members that the method keeps, and that a sampled controller remembers.
     kept: usize,
-    /// How many of a member the controller remembers.
+    /// Numbers per member that the controller remembers.
     memory: usize,
     /// The arrays as last written, if the method has a carry: if they differ now, the caller changed the state.
     written: (Vec<T>, Vec<T>),
@@ -74,11 +74,11 @@ pub struct World<T = f64> {
 /// The steps of a run.
 #[derive(Clone, Copy, Debug)]
 pub struct RunSteps {
-    /// Number of the first.
+    /// Number of the first step.
     pub first: i64,
-    /// How many.
+    /// Number of steps.
     pub steps: i64,
-    /// After how many a state is saved, and at the start; the last alone if none.
+    /// Steps after which a state is saved, and at the start; the last alone if none.
     pub every: Option<i64>,
 }
 
@@ -205,12 +205,12 @@ impl<T: Steppable> World<T> {
         self.carry_on(carry, v, y);
     }
 
-    /// What a sampled controller remembers, as rows of one number per member.
+    /// The memory of a sampled controller, as rows of one number per member.
     pub fn memory(&self) -> Vec<T> {
         self.held().split_off(self.sizes.0 + self.kept - self.memory * self.members)
     }
 
-    /// Lets a sampled controller remember this, as rows of one number per member.
+    /// Sets the memory of a sampled controller, as rows of one number per member.
     pub fn remember(&mut self, memory: &[T]) {
         if memory.len() != self.memory * self.members {
             return;
@@ -331,7 +331,7 @@ impl<T: Steppable> World<T> {
         self.step = until;
     }
 
-    /// One step. Of the rows of y the first `kept` go on, and those up to `read` are read only. `give` takes what is behind
+    /// Makes a step. Of the rows of y the first `kept` go on, and those up to `read` are read only. `give` takes the rows after
     /// these, with the number of the first member, that of members, and how long rows are.
     pub fn play(&mut self, [kept, read]: [usize; 2], y: &mut [T], mut give: impl FnMut(&[T], usize, usize, usize)) {
         let members = self.members;
@@ -448,8 +448,8 @@ impl<T: Steppable> World<T> {
 }
 
 impl World<f64> {
-    /// `n` steps with events, in place. `go_on` is asked now and then whether to; returns whether all were made. `between` is
-    /// what is known of the members since the last call.
+    /// Makes `n` steps with events, in place. `go_on` is asked now and then whether to; returns whether all were made. `between`
+    /// is the event search of the members since the last call.
     pub fn step_and_look(
         &mut self,
         n: i64,

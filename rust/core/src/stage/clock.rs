@@ -1,4 +1,4 @@
-//! What is told to a stage from step to step: the time, and a force from outside.
+//! Input of a stage from step to step: the time, and a force from outside.
 
 /// Time and step: t = `t0` + k·`h` at step k, never accumulated.
 #[derive(Clone, Copy, Debug)]

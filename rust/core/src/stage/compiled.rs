@@ -18,32 +18,32 @@ use crate::{
 pub struct Stage<T: Real = f64> {
     /// The tape.
     pub split: Split,
-    /// By the number of members that they are for.
+    /// Kernels by the number of members that they are for.
     compiled: CompiledStages<T>,
-    /// Those for rows of a length that something else has set.
+    /// Kernels for rows of a given length.
     long: CompiledStages<T>,
 }
 
-/// CompiledStages, each for a level and a number.
+/// Kernels, each for a level and a number.
 type CompiledStages<T> = Mutex<Vec<(Level, usize, Arc<CompiledStage<T>>)>>;
 
-/// What makes the steps of a stage, and what is computed before them, over rows of one length.
+/// The kernels of a stage, with the interpreters for values computed before its steps, over rows of one length.
 pub(crate) struct CompiledStage<T: Real = f64> {
     /// The hot loop.
     pub runner: Runner<T>,
-    /// Once a run.
+    /// Computes values once a run.
     pub(super) run: Interpreter,
-    /// Once for each member.
+    /// Computes values once for each member.
     pub(super) member: Interpreter,
-    /// Once for each member that takes a lane by itself.
+    /// Computes values once for each member that takes a lane by itself.
     pub(super) single: Interpreter,
-    /// Once for each step.
+    /// Computes values once for each step.
     pub(super) step: Runner<T>,
-    /// Once for each step, what of a step of float32 is computed in float64.
+    /// Computes in float64, once for each step of float32.
     pub(super) clock: Option<Runner<f64>>,
-    /// Once for each time that comes alone.
+    /// Computes values for a single time.
     pub(super) moment: Runner<T>,
-    /// Several steps at once; none where that does not pay.
+    /// Makes several steps at once; none where that does not pay.
     pub(super) unrolled: OnceLock<Option<Unrolled<T>>>,
 }
 
@@ -77,11 +77,11 @@ impl<T: Real> Unrolled<T> {
 /// How many numbers a member's state has, and how many of them are v and y.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Numbers {
-    /// All of them.
+    /// All numbers of the state.
     pub state: usize,
-    /// Of the v slot, which come first.
+    /// Numbers of the v slot, which come first.
     pub v: usize,
-    /// Of y, which come next.
+    /// Numbers of y, which come next.
     pub y: usize,
 }
 
@@ -101,12 +101,12 @@ impl<T: Real> CompiledStage<T> {
 }
 
 impl<T: Real> Stage<T> {
-    /// Of a tape that was cut.
+    /// The stage of a tape that was cut.
     pub fn new(split: Split) -> Stage<T> {
         Stage { split, compiled: Mutex::default(), long: Mutex::default() }
     }
 
-    /// Of a tape and its results, cut by what members of such a system have in common.
+    /// The stage of a tape and its results, cut by what members of such a system have in common.
     pub(crate) fn cut(signature: &Signature, (tape, next): &(Tape, Vec<Id>)) -> Stage<T> {
         let of_times = |table: u32| signature.tables.get(table as usize).is_some_and(|(name, _)| name.ends_with(".times"));
         let shared = |i: u32| i == BUDGET || signature.is_common(i);
@@ -119,19 +119,19 @@ impl<T: Real> Stage<T> {
         [&split.run, &split.member, &split.step, &split.clock, &split.body].iter().map(|body| body.ops.len()).sum::<usize>()
     }
 
-    /// What makes its steps in a run of so many members.
+    /// The kernels for a run of `members` members.
     pub(crate) fn compiled(&self, level: Level, members: usize) -> Arc<CompiledStage<T>> {
         // Some more or fewer of many members are no reason for another tile.
         let members = if members > MANY_MEMBERS { usize::MAX } else { members };
         self.find(&self.compiled, level, members, |body| Runner::new(body, level, members))
     }
 
-    /// What makes its steps over rows of so many lanes.
+    /// The kernels over rows of `lanes` lanes.
     pub(crate) fn compiled_for_lanes(&self, level: Level, lanes: usize) -> Arc<CompiledStage<T>> {
         self.find(&self.long, level, lanes, |body| Runner::long(body, level, lanes))
     }
 
-    /// What was made before for such a number, or what is made now.
+    /// The kernels for a number of members or lanes, built on first use.
     fn find(
         &self,
         compiled: &CompiledStages<T>,
@@ -153,7 +153,7 @@ impl<T: Real> Stage<T> {
     }
 }
 
-/// Above so many members the best tile, of some hundreds, does not depend on their number.
+/// Above this many members the best tile, of some hundreds, does not depend on their number.
 const MANY_MEMBERS: usize = 1024;
 /// Kernels of different lengths that are kept for a stage.
 const MOST_COMPILED: usize = 16;

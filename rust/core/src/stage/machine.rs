@@ -1,4 +1,4 @@
-//! What hot loops may use, and how they are told to stop.
+//! The means of hot loops: instruction set and threads, and the flag that stops them.
 
 use std::{
     sync::{Arc, OnceLock, atomic::AtomicBool},
@@ -7,19 +7,19 @@ use std::{
 
 use crate::isa::Level;
 
-/// What hot loops may use.
+/// The instruction set and threads of hot loops.
 #[derive(Clone, Copy, Debug)]
 pub struct Machine {
-    /// Which kernels.
+    /// The instruction set.
     pub level: Level,
     /// How many threads the forces of one large system may use; zero for as many as there are.
     pub threads: usize,
 }
 
 impl Machine {
-    /// How many threads to use for work that can be divided into so many parts, if more than one are worthwhile.
+    /// Threads to use for work that can be divided into `parts` parts, if more than one are worthwhile.
     pub(crate) fn threads_for(self, parts: usize, worthwhile: bool) -> usize {
-        /// The operating system reads files to tell it, which takes as long as a short run, so it is asked once.
+        /// The operating system reads files for it, which takes as long as a short run, so it is asked once.
         static AVAILABLE: OnceLock<usize> = OnceLock::new();
         let threads = match self.threads {
             0 if !worthwhile || parts <= 1 => 1,

@@ -30,16 +30,16 @@ const MOST_ENTRIES: usize = 1 << 16;
 /// A stage with its kernel and the parameters and inputs of some members: all that its hot loop reads.
 pub struct PreparedStage<T: Real = f64> {
     compiled: Arc<CompiledStage<T>>,
-    /// What is the same for all members, in the order of [`Split::sources`].
+    /// Numbers that all members have in common, in the order of [`Split::sources`].
     shared: Vec<T>,
-    /// The same as the kernel for entries of steps wants them, and whether that kernel is machine code.
+    /// The shared numbers in the layout of the kernel for entries of steps, and whether that kernel is machine code.
     shared_pool: Vec<T>,
     shared_pool_for: Option<KernelKind>,
-    /// What of a step of float32 is computed in float64.
+    /// The parts of a step of float32 that are computed in float64.
     clock: Option<ClockNumbers>,
     /// The uniforms of the hot loop.
     uniforms: Vec<T>,
-    /// The same as the kernel wants them, and whether that kernel is machine code.
+    /// The uniforms in the layout of the kernel, and whether that kernel is machine code.
     pool: Aligned<T>,
     pool_for: Option<KernelKind>,
     rows: Aligned<T>,
@@ -66,7 +66,7 @@ pub struct PreparedStage<T: Real = f64> {
     unrolled_pool_for: Option<KernelKind>,
 }
 
-/// Numbers of 64 bits for entries of a step of float32: what all members have in common, the same as a kernel wants it, times,
+/// Numbers of 64 bits for entries of a step of float32: those in common to all members, their layout for the kernel, times,
 /// and the values that entries are made of.
 #[derive(Default)]
 struct ClockNumbers {
@@ -79,12 +79,12 @@ struct ClockNumbers {
 }
 
 impl<T: Real> PreparedStage<T> {
-    /// For a run of so many members. `budget` is the most attempts of a member, for those.
+    /// Prepares a stage for `members` members. `budget` is the most attempts of a member, for those.
     pub fn new(stage: &Stage<T>, spec: &Spec, level: Level, members: usize, clock: &Clock, budget: f64) -> PreparedStage<T> {
         PreparedStage::with(stage, stage.compiled(level, members), spec, clock, budget)
     }
 
-    /// With a kernel that was chosen already.
+    /// Prepares a stage with a kernel that was chosen already.
     pub(crate) fn with(
         stage: &Stage<T>,
         compiled: Arc<CompiledStage<T>>,
@@ -216,7 +216,7 @@ impl<T: Real> PreparedStage<T> {
         self.take_samples(stage, spec, |row, to| to[lane] = T::of(row.at(member)));
     }
 
-    /// Fills the rows of samples of inputs of which members have their own.
+    /// Fills the rows of samples of inputs that differ between members.
     fn take_samples(&mut self, stage: &Stage<T>, spec: &Spec, take: impl Fn(&Row, &mut [T])) {
         let lanes = self.lanes();
         let of_members = stage.split.entries.iter().any(|entry| matches!(entry, Entry::Row(_)))
@@ -238,8 +238,7 @@ impl<T: Real> PreparedStage<T> {
         }
     }
 
-    /// Compiles now what would be compiled later, when it pays, and keeps one table of steps only, as real-time loops need no
-    /// more.
+    /// Compiles now instead of when it pays, and keeps one table of steps only, as real-time loops need no more.
     pub(crate) fn compile_now(&mut self) {
         self.compiled.runner.write();
         if !self.compiled.step.body().ops.is_empty() {
@@ -248,7 +247,7 @@ impl<T: Real> PreparedStage<T> {
         self.most_tables = 1;
     }
 
-    /// So many steps of a state from step `k`.
+    /// Makes `n` steps of a state from step `k`.
     pub fn advance(&mut self, stage: &Stage<T>, clock: &Clock, k: i64, n: usize, state: &mut [T]) {
         if stage.split.entries.is_empty() {
             self.steps(n, &[], state);
@@ -311,7 +310,7 @@ impl<T: Real> PreparedStage<T> {
         self.advance_over(stage, t, [t, t, 1.0], state);
     }
 
-    /// The same, where inputs are looked up over a window.
+    /// One step of a state at a time, with inputs averaged over a window.
     pub(crate) fn advance_over(&mut self, stage: &Stage<T>, t: f64, [from, to, length]: Window<f64>, state: &mut [T]) {
         if stage.split.entries.is_empty() {
             self.steps(1, &[], state);

@@ -15,7 +15,7 @@ use crate::error::Error;
 /// vector, as machine code. When a new entry would exceed it, the cache is emptied first.
 const MAX_CACHED_OPERATIONS: usize = 400_000;
 
-/// An entry takes as much memory as so many operations beside its own, by its key and what surrounds the machine code.
+/// Memory of an entry beside its own operations, as a number of operations: its key, and what surrounds the machine code.
 const OPERATIONS_OF_AN_ENTRY: usize = 400;
 
 /// How often this process, or one that it descends from, began with new caches.

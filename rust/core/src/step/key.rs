@@ -1,4 +1,4 @@
-//! What a tape depends on.
+//! The key of a tape: all that it depends on.
 
 use std::sync::Arc;
 
@@ -15,7 +15,7 @@ pub enum StepKind {
     Method {
         /// The method's name.
         name: String,
-        /// Which of its ways to start.
+        /// The number of its way to start.
         choice: usize,
     },
     /// Attempts at adaptive steps by a method.
@@ -24,7 +24,7 @@ pub enum StepKind {
         name: String,
         /// The order of its series, if it is one; 0 for that of a step of fixed length.
         order: u32,
-        /// What a step must satisfy.
+        /// The conditions for a step to be accepted.
         acceptance: Acceptance,
         /// Whether the time of the run is that of the system, negated.
         backward: bool,
@@ -43,9 +43,9 @@ pub enum StepKind {
 /// The key of a tape.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub struct TapeKey {
-    /// What is given.
+    /// The names and sizes of the model's parameters.
     pub signature: Arc<Signature>,
-    /// What makes the step.
+    /// The kind of step.
     pub how: StepKind,
     /// Quantities that are recorded beside states.
     pub record: Vec<String>,

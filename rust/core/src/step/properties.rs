@@ -1,4 +1,4 @@
-//! What is known of a step before it is traced: sizes and approximate numbers of operations.
+//! Properties of a step that are known before it is traced: sizes and approximate numbers of operations.
 
 use super::{key::StepKind, solving};
 use crate::{
@@ -50,7 +50,7 @@ pub(crate) fn recorded(signature: &Signature, names: &[String]) -> Result<usize,
 pub(super) struct Operations {
     pub rates: usize,
     pub step: usize,
-    /// Those of the equations of an implicit step, from the state.
+    /// Operations of the equations of an implicit step, from the state.
     pub equations: usize,
 }
 
@@ -125,7 +125,7 @@ fn of_method(how: &StepKind, holds: impl Fn(&Program) -> bool) -> Result<bool, E
     })
 }
 
-/// The most operations of a step that solves equations, or of these equations alone: to trace and compile so many takes some
+/// The most operations of a step that solves equations, or of these equations alone: to trace and compile this many takes some
 /// three seconds.
 pub(super) const MAX_IMPLICIT_OPERATIONS: usize = 500_000;
 

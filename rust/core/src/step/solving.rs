@@ -74,7 +74,7 @@ pub(super) fn operations(signature: &Signature, program: &Program, shape: Shape)
 /// Where the numbers of a step's equations stand behind the state and the step, in this order.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct EquationPlaces {
-    /// Of each row of the matrix the columns that hold a number.
+    /// For each row of the matrix the columns that hold a number.
     pub rows: Vec<Columns>,
     /// The places in v and y of γ·h times the derivatives of v̇ by y, and in y and v of those of ẏ by v, where y follows from v.
     pub by_y: Vec<(usize, usize)>,

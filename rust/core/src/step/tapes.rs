@@ -36,8 +36,8 @@ use crate::{
 pub struct Tapes<T: Real = f64> {
     /// One step, or one attempt, of the whole state. Attempts by a series return its coefficients behind the state.
     pub step: Stage<T>,
-    /// The same attempt by coefficients that are known, behind the state: saved states, and a held step when it is taken. Not
-    /// where operations are fused, for the attempt may fuse what made the coefficients.
+    /// An attempt by known coefficients, which stand behind the state: for saved states, and for a held step when it is taken.
+    /// Not where operations are fused, for the attempt may fuse those that made the coefficients.
     pub by_terms: Option<Stage<T>>,
     /// Whether steps are those of a series.
     pub is_series: bool,
@@ -58,14 +58,14 @@ pub struct Tapes<T: Real = f64> {
     pub record: Option<Stage<T>>,
     /// Operations of a step before equal ones were merged, but for those that a method does to blocks.
     pub written: Counts,
-    /// To how many evaluations of the rates a step with a series is equal, by the operations; 0 without one.
+    /// The cost of a step with a series, in evaluations of the rates, by the operations; 0 without one.
     pub series_evaluations: usize,
 }
 
 /// The properties and tapes of a step. Expensive ones are found on first use.
 pub struct Traced {
     key: TapeKey,
-    /// Its number among all that were found in this process: no two have the same.
+    /// Its number among all of this process: no two have the same.
     pub number: u64,
     /// How large the blocks are.
     pub shape: Shape,
@@ -87,13 +87,13 @@ pub struct Traced {
     /// Approximate numbers of operations of the rates and of a step.
     pub operations: (usize, usize),
     tapes: OnceLock<Arc<Tapes>>,
-    /// The same for numbers of 32 bits.
+    /// The tapes for numbers of 32 bits.
     singles: OnceLock<Arc<Tapes<f32>>>,
     extension: OnceLock<Arc<Stage>>,
 }
 
 impl TapeKey {
-    /// What is known of it, or was found before.
+    /// The properties of the step, with its tapes, built on first use.
     pub fn traced(&self) -> Result<Arc<Traced>, Error> {
         static CACHE: LazyLock<Cache<TapeKey, Traced>> = LazyLock::new(Cache::default);
         CACHE.find(self, || {
@@ -171,19 +171,19 @@ impl TapeKey {
     }
 }
 
-/// For so many operations counts what is known of a step that is not one tape.
+/// Operations as which the cache counts a step that is not one tape.
 const SIZE_IN_PARTS: usize = 16_000;
 
 /// Operations of a step from which on it may take so long that Ctrl-C must be answered within it.
 const LONG_STEP_OPERATIONS: usize = 1 << 24;
 
 impl Traced {
-    /// Whether a step of so many members may take long.
+    /// Whether a step of `members` members may take long.
     pub(crate) fn is_long(&self, members: usize) -> bool {
         self.operations.1.saturating_mul(members) >= LONG_STEP_OPERATIONS
     }
 
-    /// How many steps of so many members have that many operations; one or more.
+    /// Steps of `members` members that have `operations` operations; one or more.
     pub(crate) fn steps_of(&self, members: usize, operations: usize) -> i64 {
         (operations / self.operations.1.saturating_mul(members).max(1)).max(1) as i64
     }
@@ -209,7 +209,7 @@ impl Traced {
         Ok(Arc::clone(self.extension.get_or_init(|| stage)))
     }
 
-    /// The same, for numbers of the key's precision.
+    /// The tapes of all that a run needs, for numbers of the key's precision.
     pub(crate) fn tapes_of<T: Traceable>(&self) -> Result<Arc<Tapes<T>>, Error> {
         let known = T::known(self);
         if let Some(tapes) = known.get() {
@@ -222,7 +222,7 @@ impl Traced {
 
 /// Numbers whose tapes are kept.
 pub trait Traceable: Real {
-    /// Where.
+    /// The place of the tapes in the step's properties.
     fn known(traced: &Traced) -> &OnceLock<Arc<Tapes<Self>>>;
 }
 
@@ -239,7 +239,7 @@ impl Traceable for f32 {
 }
 
 impl TapeKey {
-    /// An error if a step of so many operations cannot be computed with numbers of 32 bits.
+    /// An error if a step of `operations` operations cannot be computed with numbers of 32 bits.
     fn fits_single(&self, operations: usize) -> Result<(), Error> {
         if operations > MAX_TAPE_OPERATIONS {
             return Err(Error::TooLongForSingle { operations, most: MAX_TAPE_OPERATIONS });

@@ -129,7 +129,7 @@ fn kept(method: &Method, shape: Shape) -> Vec<Block<Symbol>> {
         .collect()
 }
 
-/// What a sampled controller remembers, which stands behind these.
+/// The memory of a sampled controller, which stands behind the blocks that a method keeps.
 fn memory(signature: &Signature, method: &Method, shape: Shape) -> Block<Symbol> {
     block(shape.v + shape.y + method.kept_numbers(shape), sampled::numbers(signature))
 }
@@ -294,7 +294,7 @@ pub fn trace(tape: Tape, signature: &Signature, how: &StepKind, what: &str) -> R
     }
 }
 
-/// The same method, started in its `choice`-th way.
+/// The method, started in its `choice`-th way.
 fn started(how: &StepKind, choice: usize) -> StepKind {
     match how {
         StepKind::Method { name, choice: before } => StepKind::Method { name: name.clone(), choice: choice.max(*before) },

@@ -31,8 +31,8 @@ pub(crate) fn check(signature: &Signature, shape: Shape) -> Result<(), Error> {
     signature.watched.as_ref().map_or(Ok(()), |watched| equations::check(watched, signature, shape.v + shape.y))
 }
 
-/// The next of these numbers, of which the first is number `first` of the state, after a step to this state. Quantities depend on
-/// the state alone.
+/// The numbers after a step to this state; the first of them is number `first` of the state. Quantities depend on the state
+/// alone.
 pub(crate) fn next(p: &Parameters<Symbol>, t: Symbol, [v, y]: [&Block<Symbol>; 2], first: usize) -> Vec<Id> {
     let Some(watched) = &p.signature.watched else { return Vec::new() };
     let now = values_of(watched, p, t, v, y);

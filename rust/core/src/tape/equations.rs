@@ -25,14 +25,14 @@ pub struct Invariant {
 pub struct Friction {
     /// The decelerations, one for each vector, or one in all.
     pub limit: Vec<Id>,
-    /// What each is for.
+    /// The velocities that it acts on.
     pub on: On,
 }
 
 /// The velocities that friction acts on.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub enum On {
-    /// Vectors of so many numbers each, one after the other: all of v.
+    /// Vectors of this many numbers each, one after the other: all of v.
     Vectors(usize),
     /// One number of v at that place; of the others, by how much each changes where that one changes by 1, or nothing if none
     /// does.
@@ -40,7 +40,7 @@ pub enum On {
 }
 
 impl Friction {
-    /// Whether it is for a block of so many numbers.
+    /// Whether it is for a block of `v` numbers.
     fn fits(&self, v: usize) -> bool {
         match &self.on {
             On::Vectors(length) => *length > 0 && self.limit.len() * length == v,
@@ -123,7 +123,7 @@ impl Equations {
         Equations { ops, dv, dy, quantities, kept, functions: Vec::new(), mass: None, friction: None, digest: hasher.finish() }
     }
 
-    /// The same with values that are known as functions of others, for methods that need the series of a solution.
+    /// Adds values that are known as functions of others, for methods that need the series of a solution.
     #[must_use]
     pub fn with_functions(self, functions: Vec<Marked>) -> Equations {
         let mut hasher = DefaultHasher::new();
@@ -131,7 +131,7 @@ impl Equations {
         Equations { functions, digest: hasher.finish(), ..self }
     }
 
-    /// The same with a mass matrix.
+    /// Adds a mass matrix.
     #[must_use]
     pub fn with_mass(self, mass: Option<Mass>) -> Equations {
         let Some(mass) = mass else { return self };
@@ -140,7 +140,7 @@ impl Equations {
         Equations { mass: Some(mass), digest: hasher.finish(), ..self }
     }
 
-    /// The same with friction that sticks.
+    /// Adds friction that sticks.
     #[must_use]
     pub fn with_friction(self, friction: Option<Friction>) -> Equations {
         let Some(friction) = friction else { return self };
@@ -149,7 +149,7 @@ impl Equations {
         Equations { friction: Some(friction), digest: hasher.finish(), ..self }
     }
 
-    /// The same without operations whose result is not used.
+    /// Removes operations whose results are not used.
     #[must_use]
     pub fn without_the_rest(self) -> Equations {
         let needed = self.needed_with_functions(self.roots().collect());
@@ -194,7 +194,7 @@ impl Equations {
         self.kept.is_some()
     }
 
-    /// All values that are needed.
+    /// All values that the equations need.
     fn roots(&self) -> impl Iterator<Item = Id> {
         let kept = self.kept.iter().flat_map(|kept| kept.along_v.iter().chain(&kept.along_y).chain([&kept.value, &kept.square]));
         let friction = self.friction.iter().flat_map(Friction::values);
@@ -226,8 +226,7 @@ impl Equations {
         self.ops.iter().any(|op| matches!(op, Op::Time))
     }
 
-    /// Whether the rates are made of pieces, one of which is chosen by the state or the time. What is within a function does not
-    /// count.
+    /// Whether the rates are piecewise, with a choice by the state or the time. Choices within a function do not count.
     pub fn chooses(&self) -> bool {
         let functions: HashMap<Id, &Marked> = self.functions.iter().map(|each| (each.value, each)).collect();
         let mut varies: Vec<bool> = Vec::with_capacity(self.ops.len());
@@ -289,8 +288,8 @@ impl Equations {
         }
     }
 
-    /// Whether each operation comes after what it reads, no leaf is beyond so many parameters, tables and numbers of the state,
-    /// an invariant has a derivative by each number of the blocks, a mass matrix works with y alone, and friction fits v.
+    /// Whether each operation comes after what it reads, no leaf is beyond these counts of parameters, tables and numbers of the
+    /// state, an invariant has a derivative by each number of the blocks, a mass matrix works with y alone, and friction fits v.
     pub(crate) fn is_sound(&self, parameters: usize, tables: usize, states: usize) -> bool {
         let is_read = |(id, op): (usize, &Op)| {
             let (operands, n) = op.operands();

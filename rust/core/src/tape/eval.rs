@@ -1,4 +1,4 @@
-//! What each operation means, in one place.
+//! The meaning of each operation, in one place.
 
 use super::op::Op;
 
@@ -51,6 +51,6 @@ meaning! {
     apply, u64, f64
 }
 meaning! {
-    /// The same for numbers of 32 bits.
+    /// The bits that an operation makes of its operands of 32 bits.
     apply_single, u32, f32
 }

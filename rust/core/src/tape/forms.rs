@@ -1,4 +1,4 @@
-//! The first of what [`super::fuse::fuse`] does: a sine that is written in many operations is written in fewer fused ones.
+//! The first pass of [`super::fuse::fuse`]: a sine that is written in many operations is written in fewer fused ones.
 //!
 //! Without fused multiply-adds a sine takes the reduction by π/2 in four parts, and both sine and cosine of what remains. With
 //! them x − nπ is exact in one operation, and so is what a square or a sum loses: one polynomial on [−π/2, π/2] is enough, with
@@ -11,7 +11,7 @@
 
 use super::{Id, Op, Tape, forms_table::FORMS, uses::UseCounts};
 
-/// The same tape for these values with functions in their quick forms, and the values on it.
+/// Rewrites functions in their quick forms. Returns the new tape and the new ids of the roots.
 pub(super) fn in_quick_forms(tape: &Tape, roots: &[Id]) -> (Tape, Vec<Id>) {
     let uses = UseCounts::new(tape, roots);
     let mut made = Tape { written: tape.written, series: tape.series, ..Tape::new(tape.precision()) };

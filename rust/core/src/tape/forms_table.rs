@@ -2,7 +2,7 @@
 
 use super::Op;
 
-/// A function as operations, of which the first is its argument and the last its value; and with fused operations.
+/// A function as operations, the first its argument and the last its value; and with fused operations.
 #[derive(Debug)]
 pub(super) struct Form {
     pub plain: &'static [Op],

@@ -18,7 +18,7 @@ use super::{
     uses::UseCounts,
 };
 
-/// The same tape for these values, with fused multiply-adds, and the values on it.
+/// Rewrites sums with fused multiply-adds. Returns the new tape and the new ids of the roots.
 #[must_use]
 pub fn fuse(tape: &Tape, roots: &[Id]) -> (Tape, Vec<Id>) {
     let (tape, roots) = in_quick_forms(tape, roots);

@@ -1,7 +1,7 @@
-//! The first half of [`super::fuse::fuse`]: increments are not rounded before they are added.
+//! The second pass of [`super::fuse::fuse`]: increments are not rounded before they are added.
 //!
 //! Methods compute with increments, a factor that depends on the step h times something of the state: h·v̇. Here an increment is
-//! kept as c·factor·x, a number, what is known before the step, and a value:
+//! kept as c·factor·x, a number, a value known before the step, and a value:
 //!
 //! - a change of sign, a product with a number, and a product with something else that is known before the step change c and
 //!   the factor;
@@ -33,11 +33,11 @@ struct Rewriting<'a> {
     tape: &'a Tape,
     uses: UseCounts,
     made: Tape,
-    /// Of each value of the old tape what it is on the new one.
+    /// For each value of the old tape what it is on the new one.
     values: Vec<Value>,
 }
 
-/// The same tape, for these values, in which increments are multiplied last; and the values on it.
+/// Multiplies increments last. Returns the new tape and the new ids of the roots.
 pub(super) fn increments_last(tape: &Tape, roots: &[Id]) -> (Tape, Vec<Id>) {
     let (tape, roots) = &negated_sums(tape, roots);
     let made = Tape { written: tape.written, ..Tape::new(tape.precision()) };
@@ -50,8 +50,8 @@ pub(super) fn increments_last(tape: &Tape, roots: &[Id]) -> (Tape, Vec<Id>) {
     (work.made, roots)
 }
 
-/// The same tape with −(x + y) in place of (−x) − y. Of −x and −y a tape writes (−x) − y or (−y) − x, whichever it comes upon
-/// first, and what is made of it must not depend on that.
+/// Rewrites (−x) − y as −(x + y). Of −x and −y a tape has (−x) − y or (−y) − x, depending on which comes first, and the result
+/// must not depend on that.
 fn negated_sums(tape: &Tape, roots: &[Id]) -> (Tape, Vec<Id>) {
     let mut made = Tape { written: tape.written, ..Tape::new(tape.precision()) };
     let mut place = Vec::<Id>::with_capacity(tape.ops().len());
@@ -92,7 +92,7 @@ impl Rewriting<'_> {
         }
     }
 
-    /// Of a product what is known before the step, and what is of the state.
+    /// The factors of a product: the one known before the step, and the one of the state.
     fn weighted(&self, a: Id, b: Id) -> Option<(Id, Id)> {
         match (self.tape.is_of_state(a), self.tape.is_of_state(b)) {
             (false, true) => Some((a, b)),
@@ -101,7 +101,7 @@ impl Rewriting<'_> {
         }
     }
 
-    /// p·x, where p depends on the step. What nothing else reads of x and is known before the step goes to the factor.
+    /// p·x, where p depends on the step. Factors of x that are known before the step and read by nothing else join `factor`.
     fn increment(&mut self, p: Id, mut x: Id) -> Increment {
         let mut made = Increment { c: 1.0, factor: self.plain(p), of: 0 };
         while let Op::Mul(a, b) = self.tape.op(x)
@@ -114,7 +114,7 @@ impl Rewriting<'_> {
         Increment { of: self.plain(x), ..made }
     }
 
-    /// An increment times what is known before the step.
+    /// An increment times a value that is known before the step.
     fn times(&mut self, of: Increment, p: Id) -> Increment {
         match self.tape.op(p) {
             Op::Const(bits) => Increment { c: of.c * self.tape.precision().number(bits), ..of },

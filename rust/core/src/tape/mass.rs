@@ -1,4 +1,4 @@
-//! The mass matrix of equations M·ẏ = f, of which some rows may be zero: those equations are algebraic, 0 = f.
+//! The mass matrix of equations M·ẏ = f. Some of its rows may be zero: those equations are algebraic, 0 = f.
 //!
 //! `reference/mass.py` has the same operations in the same order.
 
@@ -6,17 +6,17 @@ use nalgebra::DVector;
 
 use super::number::Number;
 
-/// The entries of a constant matrix, by rows. Those that are zero are left out.
+/// The entries of a constant matrix, by rows, without zeros.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Hash)]
 pub struct Mass(Vec<Vec<(u32, u64)>>);
 
 impl Mass {
-    /// Of the rows with the columns and entries of each.
+    /// A matrix from its rows, with the columns and entries of each.
     pub fn new(rows: &[Vec<(u32, f64)>]) -> Mass {
         Mass(rows.iter().map(|row| row.iter().map(|(column, entry)| (*column, entry.to_bits())).collect()).collect())
     }
 
-    /// Whether it has a row and no column but those of so many numbers.
+    /// Whether it has `numbers` rows, and no column beyond them.
     pub(crate) fn fits(&self, numbers: usize) -> bool {
         self.0.len() == numbers && self.0.iter().flatten().all(|(column, _)| (*column as usize) < numbers)
     }
@@ -33,7 +33,7 @@ impl Mass {
         DVector::from_iterator(y.len(), (0..y.len()).map(sum))
     }
 
-    /// Rates without those of algebraic equations, of which none is that of a number.
+    /// The rates, with zeros for algebraic equations, which give no rate.
     pub(crate) fn rates<N: Number>(&self, rates: DVector<N>) -> DVector<N> {
         let rate = |(row, rate): (usize, &N)| if self.0[row].is_empty() { N::of(0.0) } else { *rate };
         DVector::from_iterator(rates.len(), rates.iter().enumerate().map(rate))

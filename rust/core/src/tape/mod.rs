@@ -37,13 +37,13 @@ pub struct Tape {
     ops: Vec<Op>,
     precision: Precision,
     seen: FastHashMap<Op, Id>,
-    /// Of each value: whether it is surely not −0.
+    /// For each value: whether it is surely not −0.
     not_minus_zero: Vec<bool>,
-    /// Of each value: whether it depends on the state.
+    /// For each value: whether it depends on the state.
     of_state: Vec<bool>,
     /// Counts of the requested operations on values that depend on the state, before equal ones were merged.
     written: Counts,
-    /// Of a step with a series: the operations of one evaluation of the rates, and of all coefficients of the rates.
+    /// In a step with a series: the operations of one evaluation of the rates, and of all coefficients of the rates.
     series: [usize; 2],
 }
 
@@ -107,7 +107,7 @@ impl Tape {
         self.series = [rates, coefficients];
     }
 
-    /// To how many evaluations of the rates the coefficients of a series are equal, by their operations; 0 without a series.
+    /// The cost of the coefficients of a series, in evaluations of the rates, by their operations; 0 without a series.
     pub(crate) fn series_evaluations(&self) -> usize {
         let [rates, coefficients] = self.series;
         coefficients.div_ceil(rates.max(1))
@@ -285,7 +285,7 @@ impl Tape {
         (!op.rounds() || !self.precision.number(made).is_nan()).then_some(made)
     }
 
-    /// The same operations in the same places, with some replaced by others of the same operands or earlier ones.
+    /// The tape with some operations replaced, in place, by others of the same operands or earlier ones.
     fn rewritten(&self, replace: impl Fn(Id, Op) -> Op) -> Tape {
         let ops: Vec<Op> = self.ops.iter().enumerate().map(|(id, op)| replace(id as Id, *op)).collect();
         let seen = ops.iter().enumerate().map(|(id, op)| (*op, id as Id)).collect();

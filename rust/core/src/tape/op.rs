@@ -1,4 +1,4 @@
-//! The operations of which a tape is made.
+//! The operations of a tape.
 
 /// A value on a tape, by the index of its operation.
 pub type Id = u32;
@@ -14,13 +14,13 @@ macro_rules! operations {
             $($(#[$doc])* $op $(($($type),*))?,)*
         }
 
-        /// Of each operation its name, how many operands it has, among which counts it is, and whether they may be exchanged.
+        /// For each operation its name, how many operands it has, among which counts it is, and whether they may be exchanged.
         pub const OPERATIONS: &[(&str, usize, &str, bool)] =
             &[$(($name, <[&str]>::len(&[$(stringify!($operand)),*]), stringify!($counted), commutes!($($commutes)?))),*];
 
         #[allow(unused_variables)]
         impl Op {
-            /// Its operands: the first so many of the three.
+            /// Its operands in the first places of three, and their number.
             #[inline]
             pub fn operands(self) -> ([Id; 3], usize) {
                 match self {
@@ -28,7 +28,7 @@ macro_rules! operations {
                 }
             }
 
-            /// The same operation over the first so many of three operands.
+            /// The operation with its operands taken from the first of these three.
             fn over(self, operands: [Id; 3]) -> Op {
                 let mut operands = operands.into_iter();
                 match self {
@@ -53,7 +53,7 @@ macro_rules! operations {
                 }
             }
 
-            /// What it takes besides the operands: the index of a leaf, the bits of a constant, a number of places.
+            /// The number that it takes besides the operands: the index of a leaf, the bits of a constant, a number of places.
             pub fn extra(self) -> u64 {
                 match self {
                     $(Op::$op $(($($field),*))? => $extra.into(),)*
@@ -141,7 +141,7 @@ operations! {
     LessEqual(a: Id, b: Id), [a, b], 0u32, "at most", "%{a} <= %{b}", choices;
     /// a = b
     Equal(a: Id, b: Id), [a, b], 0u32, "equal", "%{a} = %{b}", choices, commutes;
-    /// Of bits: where the first is set the second, else the third. A mask comes from a comparison.
+    /// Bits: where the first is set those of the second, else of the third. A mask comes from a comparison.
     Select(m: Id, a: Id, b: Id), [m, a, b], 0u32, "choose", "%{m} ? %{a} : %{b}", choices;
     /// Bits of both.
     And(a: Id, b: Id), [a, b], 0u32, "and", "%{a} and %{b}", bits, commutes;
@@ -153,11 +153,11 @@ operations! {
     AddBits(a: Id, b: Id), [a, b], 0u32, "add bits", "%{a} plus %{b}", bits, commutes;
     /// The first as a whole number less the second, without a borrow.
     SubBits(a: Id, b: Id), [a, b], 0u32, "subtract bits", "%{a} minus %{b}", bits;
-    /// Bits moved up by so many places, zeros after them.
+    /// Bits moved up by `n` places, zeros after them.
     ShiftUp(a: Id, n: u32), [a], n, "shift up", "%{a} << {n}", bits;
-    /// Bits moved down by so many places, zeros before them.
+    /// Bits moved down by `n` places, zeros before them.
     ShiftDown(a: Id, n: u32), [a], n, "shift down", "%{a} >> {n}", bits;
-    /// The same value again: where the next state is a number of the present one, or a constant.
+    /// A value again: where the next state is a number of the present one, or a constant.
     Copy(a: Id), [a], 0u32, "copy", "%{a}", none;
     /// Of a body ([`super::split::Body`]): a number of the member that is the same in every step.
     Row(i: u32), [], i, "row", "row[{i}]", none;
@@ -172,7 +172,7 @@ operations! {
     Gather(a: Id), [a], 0u32, "gather", "sample %{a}", none;
 }
 
-/// So many operands in three places.
+/// At most three operands in three places, and their number.
 const fn first<const N: usize>(operands: [Id; N]) -> ([Id; 3], usize) {
     let (mut three, mut i) = ([0; 3], 0);
     while i < N {
@@ -183,7 +183,7 @@ const fn first<const N: usize>(operands: [Id; N]) -> ([Id; 3], usize) {
 }
 
 impl Op {
-    /// The same operation with other operands.
+    /// The operation with other operands.
     #[must_use]
     pub fn with(self, mut f: impl FnMut(Id) -> Id) -> Op {
         let (mut operands, n) = self.operands();
@@ -193,7 +193,7 @@ impl Op {
         self.over(operands)
     }
 
-    /// The same operation with its operands in order, if they may be exchanged.
+    /// The operation with its operands in order, if they may be exchanged.
     #[must_use]
     pub(super) fn in_order(self) -> Op {
         let ([a, b, c], _) = self.operands();
@@ -234,7 +234,7 @@ pub struct Counts {
 }
 
 impl Counts {
-    /// All of them.
+    /// The sum of all counts.
     pub(crate) fn total(&self) -> usize {
         let kinds =
             [self.additions, self.multiplications, self.fused, self.divisions, self.square_roots, self.choices, self.bits];

@@ -1,4 +1,4 @@
-//! The second half of what [`super::fuse::fuse`] does before products are fused: no quotient by a number is left.
+//! The third pass of [`super::fuse::fuse`]: no quotient by a number is left.
 //!
 //! A division keeps its unit busy for as long as some ten products. With a fused multiply-add x/c is x·u + x·l rounded once,
 //! where u is 1/c cut and l what remains of it, rounded: two operations, and the bits of the quotient but where it is within
@@ -10,8 +10,7 @@
 
 use super::{Id, Op, Precision, Tape, real::power_of_two};
 
-/// The same tape for these values, with products in place of quotients by numbers of what depends on the state; and the values
-/// on it.
+/// Rewrites x / c, c constant and x state-dependent, as a product. Returns the new tape and the new ids of the roots.
 pub(super) fn without_quotients(tape: &Tape, roots: &[Id]) -> (Tape, Vec<Id>) {
     let needed = tape.needed(roots.iter().copied());
     let mut made = Tape { written: tape.written, series: tape.series, ..Tape::new(tape.precision()) };

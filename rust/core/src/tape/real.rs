@@ -52,8 +52,8 @@ impl Precision {
         1 << (8 * self.bytes() - 1)
     }
 
-    /// What is meant by a pattern of 64 bits: all bits, that of the sign and all others are those of a number of this precision.
-    /// Any other is the caller's to choose for it.
+    /// Converts a pattern of 64 bits: all bits, the bit of the sign and all others become those of a number of this precision.
+    /// Any other pattern is the caller's to choose for it.
     pub(crate) fn pattern(self, bits: u64) -> u64 {
         const ALL: u64 = u64::MAX;
         const SIGN: u64 = 1 << 63;
@@ -88,9 +88,9 @@ fn widened(bits: u64) -> f64 {
     f32::from_bits(bits as u32).into()
 }
 
-/// A number of one of them.
+/// A number of one of these precisions.
 pub trait Real: Copy + Debug + Default + PartialEq + PartialOrd + Send + Sync + 'static {
-    /// Which.
+    /// The precision.
     const PRECISION: Precision;
     /// Where the numbers of a method's carry are larger than this, or than this times the step if that is less than 1, velocities
     /// are checked after every step: see [`crate::run::fixed`].
@@ -100,11 +100,11 @@ pub trait Real: Copy + Debug + Default + PartialEq + PartialOrd + Send + Sync + 
     /// Beyond all numbers.
     const INFINITY: Self;
 
-    /// Rounded to it.
+    /// Rounds a number to this precision.
     fn of(x: f64) -> Self;
-    /// As one of 64 bits, which is exact.
+    /// Widens the number to 64 bits, which is exact.
     fn wide(self) -> f64;
-    /// Of its bits, the lowest ones.
+    /// The number with the lowest of these bits.
     fn from_pattern(bits: u64) -> Self;
     /// Its bits; those above are zero.
     fn pattern(self) -> u64;

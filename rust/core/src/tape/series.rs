@@ -28,7 +28,7 @@ pub(crate) enum Mark {
     Factors(Factors, Option<[f64; 2]>),
 }
 
-/// What is noted while a series is traced.
+/// Marks that are noted while a series is traced.
 #[derive(Default)]
 struct Marks {
     values: HashMap<Id, Mark>,
@@ -70,8 +70,8 @@ pub(crate) type Factors = Vec<(Symbol, Symbol)>;
 /// A coefficient; none if it is known to be zero.
 type Term = Option<Symbol>;
 
-/// The coefficients of a solution, from the first to the one of that order. The time is its value, the unit in powers of which
-/// they are, and this over the one of the rates.
+/// The Taylor coefficients 1 to `order` of a solution. The time is its value, the unit in whose powers they count, and this unit
+/// over that of the rates.
 pub(crate) fn of_solution(
     order: u32,
     start: &[Symbol],
@@ -161,7 +161,7 @@ struct Series {
     terms: HashMap<Id, Vec<Term>>,
     /// The values that change with time and are not the state or the time, each after those that its operation reads.
     values: Vec<Id>,
-    /// Of some of them the derivatives by others.
+    /// Derivatives of some of these values by others.
     factors: HashMap<Id, Vec<(Symbol, Symbol)>>,
     /// Bounds of those that are one branch of several.
     bounds: HashMap<Id, [f64; 2]>,
@@ -176,7 +176,7 @@ struct Series {
 }
 
 impl Series {
-    /// Of values that change with the state and the time; `fixed` does not, whatever it was made of.
+    /// A series of values that change with the state and the time; `fixed` does not, whatever it was made of.
     fn new(start: &[Symbol], time: Symbol, fixed: Option<Symbol>, rates: &[Symbol]) -> Series {
         let mut terms: HashMap<Id, Vec<Term>> = start.iter().chain([&time]).map(|seed| (seed.0, vec![Some(*seed)])).collect();
         let (mut factors, mut bounds) = (HashMap::new(), HashMap::new());
@@ -341,7 +341,7 @@ impl Series {
         sum(sum(sum(totals.0, totals.1), middle), sum(of_a(0), of_b(0))) // which does not depend on which of both is a
     }
 
-    /// Of y = f(a, b, …), from ẏ = f₁·ȧ + f₂·ḃ + …: k·yₖ = Σ j·aⱼ·f₁ₖ₋ⱼ + ….
+    /// The k-th coefficient of y = f(a, b, …), from ẏ = f₁·ȧ + f₂·ḃ + …: k·yₖ = Σ j·aⱼ·f₁ₖ₋ⱼ + ….
     fn of_function(&self, factors: &[(Symbol, Symbol)], k: usize) -> Term {
         let mut total = None;
         for (argument, factor) in factors {
@@ -355,8 +355,8 @@ impl Series {
     }
 }
 
-/// What a number divided by k is the sum of: its product with 1/k, and what the rounding of 1/k leaves out. This takes a third of
-/// the time of a division.
+/// The terms of a number divided by k: its product with 1/k, and the error by the rounding of 1/k. This takes a third of the time
+/// of a division.
 fn parts(number: Symbol, k: f64) -> Vec<Symbol> {
     const WHOLE: i128 = 1 << 90; // times the reciprocal of any order this is a whole number
     let reciprocal = 1.0 / k;

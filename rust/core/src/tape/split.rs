@@ -76,8 +76,8 @@ impl Body {
         body
     }
 
-    /// Values as the next state, of numbers that all are rows: first `states` ones of the state, then so many parameters, then
-    /// samples; of these the tables and the times. Of float32 the time and the step are the first two of the state.
+    /// A body that computes values, all of whose leaves are rows: first `states` of the state, then `parameters` parameters, then
+    /// samples; with the table and the time of each sample. In float32 the time and the step come before the state.
     pub(crate) fn of_values(tape: &Tape, values: &[Id], states: u32, parameters: u32) -> (Body, Vec<(u32, Id)>) {
         let (mut samples, is_single) = (Vec::new(), tape.precision() == Precision::Single);
         let mut body = Body::of(tape, values, &mut |id| match tape.op(id) {
@@ -195,7 +195,7 @@ impl Body {
         unrolled.finished()
     }
 
-    /// The same operations on numbers of 64 bits.
+    /// The operations, on numbers of 64 bits.
     fn widened(mut self) -> Body {
         for op in &mut self.ops {
             if let Op::Const(bits) = *op {
@@ -273,10 +273,10 @@ pub struct Split {
     pub member: Body,
     /// Its state are the first entries of the table of the steps, a lane for each step; row 0 is the time.
     pub step: Body,
-    /// The same of the other entries of a step of float32: which sample holds, and what is made of the times of samples. It
+    /// Its state are the other entries of a step of float32: the samples that hold, and results from the times of samples. It
     /// computes in float64, for a time divided by an interval takes more digits than float32 has.
     pub clock: Body,
-    /// What the entries are.
+    /// The meaning of the entries.
     pub entries: Vec<Entry>,
     /// The hot loop.
     pub body: Body,
@@ -293,8 +293,7 @@ pub fn split(tape: &Tape, next: &[Id], uniform: IsShared, common: IsShared) -> S
     split_with_times(tape, next, uniform, common, &|_| false)
 }
 
-/// The same, where `of_times` says which inputs are the times at which samples begin: these follow from the numbers of the
-/// samples.
+/// Cuts a tape. `of_times` says which inputs are the times at which samples begin: these follow from the numbers of the samples.
 pub(crate) fn split_with_times(tape: &Tape, next: &[Id], uniform: IsShared, common: IsShared, of_times: IsShared) -> Split {
     let mut tape = tape.clone();
     let next = look_up_samples(&mut tape, next, uniform, of_times);

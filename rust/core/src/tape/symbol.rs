@@ -103,7 +103,7 @@ impl Not for SymbolTruth {
     }
 }
 
-/// What a function makes of the tape of this thread.
+/// Calls a function with the tape of this thread, and returns its result.
 pub(super) fn on_tape<T>(f: impl FnOnce(&mut Tape) -> T) -> T {
     TAPE.with_borrow_mut(f)
 }

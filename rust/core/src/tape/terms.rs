@@ -1,5 +1,4 @@
-//! The third part of what [`super::fuse::fuse`] does before products are fused: two products that are added to a third value are
-//! added one by one.
+//! The fourth pass of [`super::fuse::fuse`]: two products that are added to a third value are added one by one.
 //!
 //! a + (p·q + r·s) is a product, a fused multiply-add and a sum. As (a + p·q) + r·s it is two fused multiply-adds, and the
 //! product that is known last has one operation after it in place of three. So it is written, unless a depends on the state and
@@ -16,7 +15,7 @@ struct Term {
     is_minus: bool,
 }
 
-/// The same tape for these values, with the terms of such sums in this order; and the values on it.
+/// Rewrites such sums with their terms one by one. Returns the new tape and the new ids of the roots.
 pub(super) fn terms_apart(tape: &Tape, roots: &[Id]) -> (Tape, Vec<Id>) {
     let uses = UseCounts::new(tape, roots);
     let mut made = Tape { written: tape.written, series: tape.series, ..Tape::new(tape.precision()) };

@@ -86,7 +86,7 @@ impl<T: Real> Case<T> {
     }
 }
 
-/// The next so many bytes as an integer; None if there are fewer.
+/// The next `count` bytes as an integer; None if there are fewer.
 fn next(bytes: &mut &[u8], count: usize) -> Option<u64> {
     let (of, rest) = bytes.split_at_checked(count)?;
     *bytes = rest;

@@ -13,7 +13,7 @@ use stepwell_core::{
 
 const DISASSEMBLER: &str = "aarch64-linux-gnu-objdump";
 
-/// What kernels are made of. What is not here is not exact, or not the same on all machines.
+/// The instructions that kernels may have. All others are not exact, or not the same on all machines.
 #[rustfmt::skip]
 const KNOWN: [&str; 43] = [
     "fadd", "fsub", "fmul", "fdiv", "fsqrt", "fneg", "frintm", "fmadd", "fmsub", "fnmsub", "fmla", "fmls", "fcmeq", "fcmgt", "fcmge",
@@ -34,7 +34,7 @@ fn instructions(code: &[u8], file: &str) -> Vec<(String, String)> {
     lines.lines().filter_map(named).collect()
 }
 
-/// What the first operand is: 4s of v31.4s, d of d31.
+/// The kind of the first operand: 4s of v31.4s, d of d31.
 fn kind(operands: &str) -> &str {
     let first = operands.split([',', ' ']).next().unwrap_or_default();
     first.split_once('.').map_or(first.trim_end_matches(|c: char| c.is_ascii_digit()), |(_, kind)| kind)

@@ -3,7 +3,7 @@
 use crate::emulated::{Case, compare, runner};
 use stepwell_core::tape::real::Real;
 
-/// What is written, which bits of a word say so, and a wrong word for these bits.
+/// The mistake, the mask and the bits of the words that it is for, and the wrong bits in their place.
 type Mistake = (&'static str, u32, u32, u32);
 
 const OF_DOUBLES: [Mistake; 12] = [

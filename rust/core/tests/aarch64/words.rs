@@ -4,7 +4,7 @@ use std::{fs, path::Path, process::Command};
 
 use stepwell_core::kernel::aarch64::encode::{self as n, Code, General};
 
-/// With vectors of so many numbers, what is written, as assembly, and the words that GNU's assembler (2.40) makes of that.
+/// The width of vectors, the instruction that is written, its assembly, and the words that GNU's assembler (2.40) makes of that.
 type Line = (usize, fn(&mut Code), &'static str, &'static [u32]);
 
 #[rustfmt::skip]

@@ -7,7 +7,7 @@ use stepwell_core::{
     tape::real::Precision,
 };
 
-/// What is given to a system beside its inputs.
+/// The options, parameters and inputs of a system.
 #[derive(Default)]
 pub(crate) struct Of<'a, 'b> {
     pub words: &'b [(&'b str, &'b str)],

@@ -110,7 +110,7 @@ fn writes(i: &Instruction) -> bool {
     info.used_memory().iter().any(|memory| !reads(memory.access()))
 }
 
-/// What points to rows moves by blocks only.
+/// Checks that pointers to rows move by blocks only.
 fn moves_on(i: &Instruction, block: u64, blocks: u64) {
     let to = i.op0_register();
     if i.mnemonic() == Mnemonic::Add {
@@ -131,7 +131,7 @@ fn is_multiply_add(mnemonic: Mnemonic, is_single: bool) -> bool {
         && (name.ends_with(if is_single { "ps" } else { "pd" }) || name.ends_with(if is_single { "ss" } else { "sd" }))
 }
 
-/// What kernels are made of. What is not here is not exact, or not the same on all machines.
+/// Whether kernels may have this instruction. All others are not exact, or not the same on all machines.
 fn is_known(mnemonic: Mnemonic, is_single: bool) -> bool {
     use Mnemonic::*;
     #[rustfmt::skip]

@@ -19,7 +19,7 @@ pub(crate) struct Inputs<T = f64> {
 }
 
 impl<T: Real> Inputs<T> {
-    /// For a body, over rows of so many lanes.
+    /// Inputs for a body, over rows of `lanes` lanes.
     pub(crate) fn new(random: &mut Random, body: &Body, lanes: usize, steps: usize) -> Inputs<T> {
         let mut numbers = |n: usize| (0..n).map(|_| random.number_of()).collect::<Vec<T>>();
         let (state, rows, uniforms) = (numbers(body.next.len() * lanes), numbers(body.rows * lanes), numbers(body.uniforms));
@@ -56,7 +56,7 @@ impl<T: Real> Inputs<T> {
     }
 }
 
-/// A shape of a level and a width; of few vectors if there are so many operations that all take long to write.
+/// A shape of a level and a width; of few vectors if the operations are so many that all take long to write.
 pub(crate) fn shape(random: &mut Random, operations: usize, level: Level, width: usize) -> Shape {
     let most = if operations < 1000 { 12 } else { 3 };
     let block_vectors = if random.once_in(2) { 1 + random.below(2) } else { 1 + random.below(most) };
@@ -65,7 +65,7 @@ pub(crate) fn shape(random: &mut Random, operations: usize, level: Level, width:
     Shape { level, bytes: 8, width, block_vectors, interleaved, blocks, resident: random.once_in(2) }
 }
 
-/// The same bits, or both NaN.
+/// Whether two numbers have the same bits, or both are NaN.
 pub(crate) fn same<T: Real>(a: T, b: T) -> bool {
     a.pattern() == b.pattern() || (a.wide().is_nan() && b.wide().is_nan())
 }

@@ -42,7 +42,7 @@ fn widths() -> Vec<(Level, usize)> {
     all.into_iter().filter(|(level, _)| level.here()).collect()
 }
 
-/// The same for numbers of that size.
+/// The levels and widths of this machine for numbers of this precision.
 fn widths_of(precision: Precision) -> Vec<(Level, usize)> {
     match precision {
         Precision::Double => widths(),
@@ -103,7 +103,7 @@ fn random_bodies_have_the_bits_of_the_interpreter() {
     println!("{seed} bodies, {seen} pairs of a body and an input");
 }
 
-/// The same with numbers of 32 bits; half as many, since twice as many are in a vector.
+/// As the test above, with numbers of 32 bits; half as many, since twice as many are in a vector.
 #[test]
 fn random_bodies_of_single_precision_have_the_bits_of_the_interpreter() {
     let wanted = std::env::var("STEPWELL_FUZZ").ok().and_then(|n| n.parse().ok());

@@ -37,7 +37,7 @@ fn alike(random: &mut Random, operations: usize, states: usize, copies: usize) -
     whole
 }
 
-/// Compares a random body, some operations of which are lanes of one vector, with the interpreter; returns on how many inputs,
+/// Compares a random body, with some operations packed into vectors, with the interpreter; returns on how many inputs,
 /// and how many instructions that move numbers between lanes there are.
 fn one_packed(seed: u64) -> [usize; 2] {
     let random = &mut Random(seed.wrapping_mul(0x9E37_79B9_7F4A_7C15));

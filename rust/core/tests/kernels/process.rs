@@ -1,4 +1,4 @@
-//! What a kernel does to the process: pages, and where they are not to be had.
+//! The effects of a kernel on the process: pages, and where they are not to be had.
 
 #![allow(unsafe_code, reason = "asks the system for what a test needs")]
 
@@ -145,7 +145,7 @@ fn a_child_process_runs_the_kernels_of_its_parent() {
     }
 }
 
-/// What Windows is asked.
+/// Questions to Windows.
 #[cfg(windows)]
 mod windows {
     use std::ffi::c_void;
@@ -174,7 +174,7 @@ mod windows {
     pub(super) fn rights() -> Vec<u32> {
         const COMMITTED: u32 = 0x1000;
         let (mut at, mut region, mut rights) = (0, Region::default(), Vec::new());
-        // SAFETY: it writes the region, which is as long as it is told.
+        // SAFETY: it writes the region, whose length it is given.
         while unsafe { VirtualQuery(at, &raw mut region, size_of::<Region>()) } != 0 {
             rights.extend((region.state == COMMITTED).then_some(region.rights));
             at = region.start + region.size;

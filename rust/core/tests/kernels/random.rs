@@ -21,7 +21,7 @@ impl Random {
         (self.bits() % n as u64) as usize
     }
 
-    /// Once in so many times.
+    /// True once in `n` times.
     pub(crate) fn once_in(&mut self, n: usize) -> bool {
         self.below(n) == 0
     }
@@ -49,7 +49,7 @@ impl Random {
     }
 }
 
-/// About so many operations for the body of a seed; one body in 400 is as long as that of a system of some hundred numbers.
+/// About how many operations the body of a seed has; one body in 400 is as long as that of a system of some hundred numbers.
 pub(crate) fn length(seed: u64, random: &mut Random) -> usize {
     match random.below(8) {
         _ if seed % 400 == 17 => random.one_of(&[5000, 20_000, 70_000]),
@@ -60,7 +60,7 @@ pub(crate) fn length(seed: u64, random: &mut Random) -> usize {
 }
 
 impl Random {
-    /// The same for either size of numbers: of 32 bits often any bits, or a subnormal one.
+    /// A number of either precision: of 32 bits often any bits, or a subnormal one.
     pub(crate) fn number_of<T: Real>(&mut self) -> T {
         match (T::PRECISION, self.below(8)) {
             (Precision::Single, 0) => T::from_pattern(self.bits()),
@@ -70,7 +70,7 @@ impl Random {
     }
 }
 
-/// The same body for numbers of 32 bits.
+/// The body for numbers of 32 bits.
 #[allow(dead_code, reason = "not all tests have such bodies")]
 pub(crate) fn in_single(body: Body) -> Body {
     let ops = body.ops.iter().map(|op| match *op {
@@ -87,9 +87,9 @@ pub(crate) fn in_single(body: Body) -> Body {
 struct Maker<'a> {
     random: &'a mut Random,
     ops: Vec<Op>,
-    /// Of each value whether its bits are promised: it cannot be a NaN that arithmetic made.
+    /// For each value whether its bits are promised: it cannot be a NaN that arithmetic made.
     sure: Vec<bool>,
-    /// Of each value whether it is a mask.
+    /// For each value whether it is a mask.
     mask: Vec<bool>,
 }
 
@@ -176,7 +176,7 @@ impl Maker<'_> {
     }
 }
 
-/// A body of about so many operations.
+/// A body of about `operations` operations.
 pub(crate) fn body(random: &mut Random, operations: usize, states: usize) -> Body {
     let (rows, uniforms, per_step) = (random.below(6), random.below(4), random.below(5));
     // Numbers of the state whose bits are promised, since their next values are.
@@ -227,7 +227,7 @@ pub(crate) fn body(random: &mut Random, operations: usize, states: usize) -> Bod
     if random.once_in(5) { body } else { needed(body) }
 }
 
-/// Without operations whose result is not used.
+/// The body without operations whose result is not used.
 fn needed(body: Body) -> Body {
     let mut needed = vec![false; body.ops.len()];
     body.next.iter().for_each(|id| needed[*id as usize] = true);

@@ -45,7 +45,7 @@ fn a_vector_is_behind_the_one_before() {
     assert_eq!(in_turn(2, interleaved(2, 2), 5), [(0, 0), (1, 0), (0, 1), (1, 1)]);
 }
 
-/// A step of so many numbers: each grows by the sum of all squares, which wait for each other.
+/// A step of `numbers` numbers: each grows by the sum of all squares, which wait for each other.
 #[cfg(target_arch = "x86_64")]
 fn squares(numbers: u32) -> Body {
     let mut ops: Vec<Op> = (0..numbers).map(Op::State).collect();

@@ -13,7 +13,7 @@ use stepwell_core::{
 
 use crate::random::Random;
 
-/// What expressions are of: the numbers of one member at one step.
+/// The numbers that expressions are of: those of one member at one step.
 #[derive(Clone, Copy, Default)]
 pub(crate) struct Given<'a> {
     pub state: &'a [f64],
@@ -52,7 +52,7 @@ pub(crate) fn evaluate(ops: &[Op], given: &Given) -> Vec<u64> {
     values
 }
 
-/// The same bits, or both NaN: its sign and payload are not promised.
+/// Whether two numbers have the same bits, or both are NaN: its sign and payload are not promised.
 pub(crate) fn same(a: u64, b: u64) -> bool {
     a == b || (f64::from_bits(a).is_nan() && f64::from_bits(b).is_nan())
 }
@@ -75,7 +75,7 @@ fn number(random: &mut Random) -> f64 {
 /// An expression as it is asked for: nothing is shortened.
 struct Asked {
     ops: Vec<Op>,
-    /// Of each value whether its bits are promised, because it cannot be a NaN that arithmetic made.
+    /// For each value whether its bits are promised, because it cannot be a NaN that arithmetic made.
     sure: Vec<bool>,
 }
 

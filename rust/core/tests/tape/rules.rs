@@ -95,7 +95,7 @@ fn show(tape: &Tape, id: Id) -> String {
     format!("({name} {})", operands.join(" "))
 }
 
-/// What a tape makes of an expression.
+/// An expression as a tape shortens it.
 fn shortened(text: &str) -> String {
     let mut tape = Tape::default();
     for i in 0..3 {
@@ -337,7 +337,7 @@ fn operations_are_counted_before_and_after() {
     assert_eq!(tape.written([next, needless]), Counts { divisions: 1, ..counts });
 }
 
-/// What is fused of an expression of x, y and z, if these others are asked for as well.
+/// An expression of x, y and z as it is fused, if these others are asked for as well.
 fn fused(text: &str, also: &[&str]) -> String {
     let mut tape = Tape::default();
     for i in 0..3 {

@@ -6,9 +6,9 @@
 /// The word of an instruction for either size of numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Words {
-    /// For numbers of 64 bits.
+    /// The word for numbers of 64 bits.
     pub double: u32,
-    /// For numbers of 32 bits.
+    /// The word for numbers of 32 bits.
     pub single: u32,
 }
 
@@ -40,12 +40,12 @@ const fn form(vector: u32, one: u32) -> Form {
     Form { vector: sized(vector), one: sized(one) }
 }
 
-/// On bits: over 16 bytes, or over 8.
+/// An instruction on bits: over 16 bytes, or over 8.
 const fn bitwise(vector: u32) -> Form {
     Form { vector: same(vector), one: same(vector & !IS_WHOLE) }
 }
 
-/// On numbers as whole ones. There is no instruction on one of 32 bits; that on two leaves the second, which is zero, as it is.
+/// An instruction on whole numbers. None is on one of 32 bits; that on two leaves the second, which is zero, as it is.
 const fn whole(vector: u32) -> Form {
     let vector = sized(vector);
     Form { vector, one: Words { double: vector.double | IS_ONE, single: vector.single & !IS_WHOLE } }
@@ -58,16 +58,16 @@ pub const DIV: Form = form(0x6E60_FC00, 0x1E60_1800);
 pub const SQRT: Form = form(0x6EE1_F800, 0x1E61_C000);
 /// Changes the sign, of a NaN as well.
 pub const NEG: Form = form(0x6EE0_F800, 0x1E61_4000);
-/// To a whole number, downwards.
+/// Rounds down to a whole number.
 pub const FLOOR: Form = form(0x4E61_9800, 0x1E65_4000);
-/// All ones where it is true; false of a NaN.
+/// Comparisons: all ones where true; false for a NaN.
 pub const EQUAL: Form = form(0x4E60_E400, 0x5E60_E400);
 pub const GREATER: Form = form(0x6EE0_E400, 0x7EE0_E400);
 pub const GREATER_EQUAL: Form = form(0x6E60_E400, 0x7E60_E400);
 pub const AND: Form = bitwise(0x4E20_1C00);
 pub const OR: Form = bitwise(0x4EA0_1C00);
 pub const XOR: Form = bitwise(0x6E20_1C00);
-/// What is overwritten chooses: the first where its bit is set, else the second (BSL).
+/// Chooses by the overwritten register: the first operand where its bit is set, else the second (BSL).
 pub const CHOOSE: Form = bitwise(0x6E60_1C00);
 /// Overwrites by the first where the second is set (BIT).
 pub const INSERT_WHERE: Form = bitwise(0x6EA0_1C00);
@@ -75,30 +75,30 @@ pub const INSERT_WHERE: Form = bitwise(0x6EA0_1C00);
 pub const INSERT_WHERE_NOT: Form = bitwise(0x6EE0_1C00);
 pub const ADD_BITS: Form = whole(0x4EE0_8400);
 pub const SUB_BITS: Form = whole(0x6EE0_8400);
-/// Adds first · second to what is overwritten, rounded once. Of one number that is [`Code::fused`].
+/// Adds first · second to the overwritten register, rounded once. For one number that is [`Code::fused`].
 pub const ADD_PRODUCT: Words = sized(0x4E60_CC00);
-/// Subtracts it.
+/// Subtracts first · second, likewise.
 pub const SUB_PRODUCT: Words = sized(0x4EE0_CC00);
-/// Of one number, with an operand for each: term + first · second, rounded once.
+/// For one number, with an operand for each: term + first · second, rounded once.
 pub const MUL_ADD: Words = sized(0x1F40_0000);
 /// term − first · second
 pub const SUB_MUL: Words = sized(0x1F40_8000);
 /// first · second − term
 pub const MUL_SUB: Words = sized(0x1F60_8000);
 
-/// The place of a shift's amount is also that of the size of numbers: the word is for numbers of so many bits only.
+/// A shift. The place of its amount is also that of the size of numbers: the word is for numbers of `bits` bits only.
 const fn shift(vector: u32, bits: u32, amount: u32) -> Form {
     let vector = vector | amount << 16;
     let one = if bits == 64 { vector | IS_ONE } else { vector & !IS_WHOLE };
     Form { vector: same(vector), one: same(one) }
 }
 
-/// Moves the bits of numbers of so many bits up by fewer places than that.
+/// Moves the bits of numbers of `bits` bits up by fewer places than that.
 pub const fn shift_up(bits: u32, places: u32) -> Form {
     shift(0x4F00_5400, bits, bits + places)
 }
 
-/// Moves them down, by 1 place to all: there is none by 0.
+/// Moves these bits down, by 1 place to all: there is none by 0.
 pub const fn shift_down(bits: u32, places: u32) -> Form {
     shift(0x6F00_0400, bits, 2 * bits - places)
 }
@@ -130,7 +130,7 @@ impl Code {
         if self.width == 1 { form.one } else { form.vector }
     }
 
-    /// Of the two, the one for numbers of this size.
+    /// The first or the second, for numbers of this size.
     fn sized<T>(&self, double: T, single: T) -> T {
         if self.size == 8 { double } else { single }
     }
@@ -169,7 +169,7 @@ impl Code {
         self.operands(Words { double: 0x4E08_0400, single: 0x4E04_0400 }, u32::from(from) << 5 | u32::from(to));
     }
 
-    /// A vector from so many bytes behind a pointer; of one number only, if asked for. What lies far away takes `spare`.
+    /// A vector from `at` bytes behind a pointer, or only one number. A distant address takes `spare`.
     pub fn load_vector(&mut self, to: u8, base: General, at: u32, one: bool, spare: General) {
         let of_one = self.sized([0xFD40_0000, 0xFC60_6800], [0xBD40_0000, 0xBC60_6800]);
         let is_one = one || self.width == 1;
@@ -204,7 +204,7 @@ impl Code {
         }
     }
 
-    /// `to` ← `base` + so many numbers.
+    /// `to` ← `base` + `index` numbers.
     pub fn add_numbers(&mut self, to: General, base: General, index: General) {
         self.word(0x8B00_0000 | self.size.trailing_zeros() << 10 | index.0 << 16 | base.0 << 5 | to.0);
     }

@@ -20,11 +20,11 @@ use crate::{
 /// An instruction, or a few that belong together.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Instruction {
-    /// Of two values.
+    /// An instruction of two values.
     Two(Form),
-    /// Of two values, the second first.
+    /// An instruction of two values, the second first.
     Turned(Form),
-    /// Of one.
+    /// An instruction of one value.
     One(Form),
     /// a · b + c, rounded once.
     MulAdd,
@@ -32,9 +32,9 @@ pub(crate) enum Instruction {
     MulSub,
     /// c − a · b
     SubMul,
-    /// By the bits of the first, of the second and the third.
+    /// The second or the third value, by the bits of the first.
     Select,
-    /// The same.
+    /// A copy of the operand.
     Copy,
 }
 

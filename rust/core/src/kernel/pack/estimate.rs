@@ -18,7 +18,7 @@ const STEPS: [usize; 2] = [6, 3];
 const LONG_STEPS: [usize; 2] = [3, 1];
 const LONG: usize = 2 * WINDOW;
 
-/// The times of an operation; none of what is there before.
+/// The times of an operation; none of a value that is known before the step.
 pub(crate) fn time_of(make: &Make) -> Option<Timing> {
     let latency = match make {
         Make::State(_) | Make::Fixed(_) | Make::Now(_) => return None,

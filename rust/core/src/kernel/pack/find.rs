@@ -20,7 +20,7 @@ pub(crate) struct Packs {
     pub ops: Vec<Op>,
     /// Two to four operations each.
     pub packs: Vec<Vec<Id>>,
-    /// Of each operation its vector.
+    /// For each operation its vector.
     pub of: Vec<Option<u32>>,
 }
 
@@ -35,7 +35,7 @@ impl Packs {
         self.packs.is_empty()
     }
 
-    /// What a trial finds.
+    /// The packs that a trial finds.
     pub(crate) fn find(body: &Body, trial: Trial) -> Packs {
         let mut finder = Finder::new(body);
         if trial.together > 1 {
@@ -52,7 +52,7 @@ impl Packs {
     }
 }
 
-/// What an operation is, without its operands.
+/// The kind of an operation: the operation without its operands.
 fn kind(op: Op) -> Op {
     op.with(|_| 0)
 }
@@ -62,9 +62,9 @@ struct Finder {
     height: Vec<u32>,
     /// Equal for operations of the same form, down to the leaves.
     form: Vec<u64>,
-    /// Of each operation those that it is an operand of, in order.
+    /// For each operation those that it is an operand of, in order.
     users: Vec<Vec<Id>>,
-    /// Vectors whose operands and users were not looked at.
+    /// Vectors whose operands and users were not searched yet.
     queue: VecDeque<u32>,
 }
 
@@ -192,7 +192,7 @@ impl Finder {
         }
     }
 
-    /// The operands of the lanes.
+    /// Packs the operands of the lanes.
     fn below(&mut self, lanes: &[Id]) {
         let (_, count) = self.packs.ops[lanes[0] as usize].operands();
         for at in 0..count {
@@ -201,7 +201,7 @@ impl Finder {
         }
     }
 
-    /// What is made of the lanes.
+    /// Packs the users of the lanes.
     fn above(&mut self, lanes: &[Id]) {
         for user in self.users[lanes[0] as usize].clone() {
             if self.packs.of[user as usize].is_some() {

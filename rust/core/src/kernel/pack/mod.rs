@@ -22,29 +22,29 @@ use crate::tape::split::Body;
 
 /// A packing must save this share of the cycles of a step: the model is not exact.
 const LEAST_GAIN: f64 = 0.04;
-/// Steps of fewer operations are not looked at.
+/// Steps of fewer operations are not packed.
 const FEWEST_OPERATIONS: usize = 8;
 /// In longer steps less is tried, so that it does not take long, and nothing is made a second time: there are enough operations
 /// that do not wait for what is moved.
 const LONG_STEP_OPERATIONS: usize = 600;
-/// In steps of so many, such as those of a series, only the widest vectors are tried: each trial takes as long as thousands of
-/// steps.
+/// In steps of more operations, such as those of a series, only the widest vectors are tried: each trial takes as long as
+/// thousands of steps.
 const VERY_LONG_STEP_OPERATIONS: usize = 5000;
-/// Steps longer than that are not looked at: it would take seconds. None is one tape, whose operations are
+/// Longer steps are not packed: it would take seconds. No step of one tape is longer: its operations are
 /// estimated to be at most 100 000, and may be twice as many.
 const MOST_OPERATIONS: usize = 250_000;
 
-/// What is tried: how many successive numbers of the state are made by one vector, and how many roots.
+/// The trials: how many successive numbers of the state, and how many roots, one vector makes.
 const TRIALS: [(usize, usize); 6] = [(1, 4), (2, 4), (3, 4), (4, 4), (1, 2), (2, 2)];
 
-/// What packing does for a step, and why it is done or not: cycles of a step as the model has them.
+/// The effect of packing on a step, and the reason to pack or not: cycles of a step by the model.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Verdict {
-    /// Number by number.
+    /// Cycles number by number.
     pub single: f64,
-    /// With the best packing; None if none was found.
+    /// Cycles with the best packing; None if none was found.
     pub packed: Option<f64>,
-    /// Of an operation waiting for another, if there were units for all: no packing is faster.
+    /// Cycles of the longest chain of operations, if there were units for all: no packing is faster.
     pub chain: f64,
     /// Operations of a step.
     pub operations: usize,
@@ -61,8 +61,8 @@ impl Verdict {
     }
 }
 
-/// The best packing of a body and what the model says of it. None for the packing if no operations are alike or the step is a
-/// chain already; None at all if the step is too short or too long to be looked at.
+/// The best packing of a body and the model's verdict. None for the packing if no operations are alike or the step is a
+/// chain already; None at all if the step is too short or too long to be packed.
 pub fn best(body: &Body) -> Option<(Verdict, Option<Packed>)> {
     let operations = body.work();
     if !(FEWEST_OPERATIONS..=MOST_OPERATIONS).contains(&operations) {

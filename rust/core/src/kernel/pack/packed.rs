@@ -50,7 +50,7 @@ pub struct Vector {
 }
 
 impl Vector {
-    /// What it reads.
+    /// The vectors that it reads.
     pub(crate) fn of(&self) -> &[u32] {
         &self.of[..self.operands as usize]
     }
@@ -64,7 +64,7 @@ impl Vector {
 /// A vector of numbers of the state.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StateVector {
-    /// Which numbers, lane by lane: 1 to 4.
+    /// The numbers of the state, lane by lane: 1 to 4.
     pub numbers: Vec<u32>,
     /// The vector that replaces it; no other one is replaced by it.
     pub next: u32,
@@ -77,13 +77,13 @@ pub struct StateVector {
 /// A body whose operations are vectors of one member's numbers.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Packed {
-    /// Each after those that it is made of.
+    /// The vectors, each after those that it is made of.
     pub vectors: Vec<Vector>,
     /// The vectors of the state.
     pub state: Vec<StateVector>,
 }
 
-/// Which packing is tried.
+/// A packing to try.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Trial {
     /// Successive numbers of the state that are made by one vector; one for none.

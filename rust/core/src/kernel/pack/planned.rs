@@ -1,4 +1,4 @@
-//! From vectors of one member's numbers to instructions.
+//! Instruction selection for vectors of one member's numbers.
 
 use std::collections::HashMap;
 
@@ -12,7 +12,7 @@ use crate::{
 };
 
 impl<I: Copy> KernelPlan<I> {
-    /// For vectors of one member's numbers. None if the machine has no instructions for them.
+    /// The plan for vectors of one member's numbers. None if the machine has no instructions for them.
     pub(crate) fn packed<M: InstructionSet<Instruction = I>>(body: &Body, packed: &Packed, machine: &M) -> Option<KernelPlan<I>> {
         if !M::PACKS {
             return None;

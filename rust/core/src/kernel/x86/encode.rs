@@ -9,9 +9,9 @@
 pub(crate) struct Form {
     /// The opcode map: 1 is 0F, 2 is 0F 38, 3 is 0F 3A.
     pub map: u8,
-    /// Of numbers of 64 bits.
+    /// The codes for numbers of 64 bits.
     pub double: Codes,
-    /// Of numbers of 32 bits.
+    /// The codes for numbers of 32 bits.
     pub single: Codes,
     /// Whether VEX has to say (W) that numbers are of 64 bits. EVEX always does.
     pub wide: bool,
@@ -20,9 +20,9 @@ pub(crate) struct Form {
 /// The mandatory prefix (0 none, 1 is 66, 2 is F3, 3 is F2) and the opcode.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Codes {
-    /// Over vectors.
+    /// The instruction on vectors.
     pub vector: (u8, u8),
-    /// For the first number of a vector only, if there is such an instruction.
+    /// The instruction on the first number of a vector only, if there is one.
     pub first: Option<(u8, u8)>,
 }
 
@@ -35,17 +35,17 @@ const fn form(map: u8, prefix: u8, opcode: u8) -> Form {
     Form { map, double: codes(prefix, opcode), single: codes(prefix, opcode), wide: false }
 }
 
-/// The same with another opcode for numbers of 32 bits.
+/// An instruction with another opcode for numbers of 32 bits.
 const fn sized(map: u8, prefix: u8, double: u8, single: u8) -> Form {
     Form { single: codes(prefix, single), ..form(map, prefix, double) }
 }
 
-/// Numbers of 64 bits have the prefix 66, those of 32 bits have none.
+/// An instruction with prefix 66 for numbers of 64 bits, and none for those of 32 bits.
 const fn plain(opcode: u8) -> Form {
     Form { single: codes(0, opcode), ..form(1, P66, opcode) }
 }
 
-/// The same with an instruction for the first number only.
+/// As `plain`, with an instruction for the first number only.
 const fn arithmetic(opcode: u8) -> Form {
     Form {
         double: Codes { first: Some((PF2, opcode)), ..codes(P66, opcode) },
@@ -121,13 +121,13 @@ pub(crate) const BLEND: Form = form(2, P66, 0x65);
 pub(crate) const BLEND_BY_SIGN: Form = sized(3, P66, 0x4B, 0x4A);
 /// Any function of three bits (EVEX).
 pub(crate) const BITS_OF_THREE: Form = form(3, P66, 0x25);
-/// All ones where a bit of the mask is set (EVEX).
+/// Sets all ones where a bit of the mask is set (EVEX).
 pub(crate) const SPREAD_MASK: Form = form(2, PF3, 0x38);
 pub(crate) const LOAD: Form = arithmetic(0x10);
 pub(crate) const STORE: Form = arithmetic(0x11);
-/// From register to register.
+/// Copies from register to register.
 pub(crate) const MOVE: Form = plain(0x28);
-/// One number to all lanes.
+/// Copies one number to all lanes.
 pub(crate) const BROADCAST: Form = sized(2, P66, 0x19, 0x18);
 
 /// A vector of two: a number of the first and one of the second, by the byte behind.
@@ -159,7 +159,7 @@ pub(crate) enum General {
 pub(crate) struct Memory {
     pub base: General,
     pub at: i32,
-    /// What is in rax is added, as so many numbers.
+    /// Whether rax is added, as a count of numbers.
     pub indexed: bool,
     /// One number, for all lanes.
     pub broadcast: bool,
@@ -191,7 +191,7 @@ pub(crate) struct Code {
 }
 
 impl Code {
-    /// What there is of a form for numbers of this size.
+    /// The codes of a form for numbers of this size.
     pub(crate) fn codes(&self, form: Form) -> Codes {
         if self.size == 8 { form.double } else { form.single }
     }

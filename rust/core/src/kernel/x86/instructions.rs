@@ -21,9 +21,9 @@ use crate::{
 /// An instruction, or a few that belong together.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Instruction {
-    /// Of two values. Whether they may be exchanged.
+    /// An instruction of two values. Whether they may be exchanged.
     Two(Form, bool),
-    /// Of one, with or without an immediate byte.
+    /// An instruction of one value, with or without an immediate byte.
     One(Form, Option<u8>),
     /// A product and a sum, rounded once.
     Fused(x::Fused),
@@ -31,13 +31,13 @@ pub(crate) enum Instruction {
     Shift(u8, u8),
     /// A mask of two values, by predicate.
     Compare(u8),
-    /// By the bits of the first, of the second and the third. Whether the first is surely a mask: all bits of a number or none.
+    /// The second or the third, by the bits of the first. Whether that is surely a mask: all bits of a number or none.
     Select(bool),
     /// The comparison of the first two by predicate chooses of the third and the fourth.
     Pick(u8),
-    /// The same.
+    /// A copy of the operand.
     Copy,
-    /// Numbers of one member between lanes.
+    /// A move of numbers of one member between lanes.
     Move(Move),
 }
 

@@ -23,8 +23,8 @@ use crate::{
     stage::Stop,
 };
 
-/// Bodies, all of which have mass, from which on threads are worthwhile. They are started anew for each force, which takes some
-/// hundredths of a millisecond.
+/// From this many massive bodies on, threads are worthwhile. They are started anew for each force, which takes some hundredths
+/// of a millisecond.
 const MIN_BODIES_FOR_THREADS: usize = 1024;
 
 /// The bodies of one member, scaled to the step.
@@ -36,7 +36,7 @@ struct Bodies {
     h: f64,
     slabs: Vec<Vec<Distances>>,
     mass: Vec<f64>,
-    /// Of each body with mass, that, ½·h·m and h·G·m.
+    /// Per massive body: m, ½·h·m and h·G·m.
     own: Vec<f64>,
     half: Vec<f64>,
     strength: Vec<f64>,

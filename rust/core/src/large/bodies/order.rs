@@ -1,8 +1,8 @@
-//! Which bodies have mass: those come first, the rest after them, each kind in its own order.
+//! The order of the bodies: massive ones come first, then those without mass, each kind in its own order.
 
 use crate::model::{spec::Signature, systems::nbody};
 
-/// The order of the bodies, and room for what is taken in it.
+/// The order of the bodies, and buffers for values in this order.
 #[derive(Default)]
 pub(super) struct Order {
     massive: Vec<usize>,
@@ -18,51 +18,51 @@ impl Order {
         Order { massive: nbody::massive(signature), massless: signature.list("massless").to_vec(), ..Order::default() }
     }
 
-    /// How many have mass.
+    /// The number of massive bodies.
     pub(super) fn massive(&self) -> usize {
         self.massive.len()
     }
 
-    /// The numbers of those without.
+    /// The numbers of the bodies without mass.
     pub(super) fn massless(&self) -> &[u32] {
         &self.massless
     }
 
-    /// The number of one with mass.
+    /// The number of the k-th massive body.
     pub(super) fn number(&self, k: usize) -> usize {
         self.massive[k]
     }
 
-    /// Takes the places of the bodies with mass.
+    /// Takes the places of the massive bodies.
     pub(super) fn take_places(&mut self, dim: usize, y: &[f64]) {
         self.places.clear();
         self.massive.iter().for_each(|i| self.places.extend_from_slice(&y[dim * i..][..dim]));
         self.pushes.resize(self.places.len(), 0.0);
     }
 
-    /// These.
+    /// The places of the massive bodies, in their order.
     pub(super) fn places(&self) -> &[f64] {
         &self.places
     }
 
-    /// These, and room for what pushes them.
+    /// The places, and a buffer for their accelerations.
     pub(super) fn places_and_pushes(&mut self) -> (&[f64], &mut [f64]) {
         (&self.places, &mut self.pushes)
     }
 
-    /// Puts that where it belongs.
+    /// Scatters the accelerations to the rows of their bodies.
     pub(super) fn spread_pushes(&self, dim: usize, out: &mut [f64]) {
         for (push, i) in self.pushes.chunks_exact(dim).zip(&self.massive) {
             out[dim * i..][..dim].copy_from_slice(push);
         }
     }
 
-    /// Blocks in this order.
+    /// The rows of these blocks in this order.
     pub(super) fn all_of<'a, const B: usize>(&'a mut self, dim: usize, blocks: [&'a [f64]; B]) -> [&'a [f64]; B] {
         self.arranged(dim, blocks, usize::MAX)
     }
 
-    /// Of blocks what belongs to bodies with mass.
+    /// The rows of these blocks that belong to massive bodies.
     pub(super) fn massive_of<'a, const B: usize>(&'a mut self, dim: usize, blocks: [&'a [f64]; B]) -> [&'a [f64]; B] {
         self.arranged(dim, blocks, self.massive.len())
     }

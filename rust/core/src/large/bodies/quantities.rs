@@ -90,11 +90,11 @@ pub(super) fn kinetic(dim: usize, half: &[f64], v: &[f64]) -> f64 {
 
 /// Fills rows with quantities, one after the other.
 pub(super) struct Record<'a> {
-    /// What the search for the nearest two may use. The others are sums over bodies, which take little beside a force.
+    /// The instruction set of the search for the nearest two. The others are sums over bodies, which take little beside a force.
     pub(super) level: Level,
     pub(super) h: f64,
     pub(super) what: &'a [Quantity],
-    /// Of each body with mass: the mass, ½·h·m, and h times the potential at these places.
+    /// For each body with mass: the mass, ½·h·m, and h times the potential at these places.
     pub(super) mass: &'a [f64],
     pub(super) half: &'a [f64],
     pub(super) potential: &'a [f64],
@@ -105,7 +105,7 @@ pub(super) struct Record<'a> {
 }
 
 impl Record<'_> {
-    /// Does it, in so many directions.
+    /// Fills the rows, in `D` directions.
     pub(super) fn fill<const D: usize>(self) {
         let Self { level, h, what, mass, half, potential, v, y, rows } = self;
         let (places, speeds) = (y.as_chunks::<D>().0, &v.as_chunks::<D>().0[..mass.len()]);
@@ -137,10 +137,10 @@ impl Record<'_> {
     }
 }
 
-/// The least distance of two bodies of which one has mass, eight partners at a time. The order of the pairs does not matter.
+/// The least distance between a massive body and another, eight partners at a time. The order of the pairs does not matter.
 struct Closest<'a, const D: usize> {
     massive: usize,
-    /// Those with mass come first.
+    /// All bodies, massive ones first.
     bodies: &'a [[f64; D]],
     least: &'a mut f64,
 }

@@ -24,7 +24,7 @@ pub(super) fn add(to: &mut [f64], from: &[f64], more: bool) {
     }
 }
 
-/// Every slab into its share, on as many threads as there are sums.
+/// Computes every slab into its share, on as many threads as there are sums.
 pub(super) fn share(
     slabs: &[Vec<Distances>],
     shares: &mut [Share],
@@ -57,7 +57,7 @@ pub(super) fn share(
     }
 }
 
-/// Some bodies without mass.
+/// A part of the bodies without mass.
 struct Part<'a> {
     bodies: &'a [u32],
     /// The forces on the bodies from number `first` on.
@@ -66,8 +66,8 @@ struct Part<'a> {
     done: bool,
 }
 
-/// Calls a function for parts of the bodies without mass, on so many threads: with the numbers of some, the forces on the bodies
-/// from a first one on, and the number of that one.
+/// Calls a function on `threads` threads, each time for a part of the bodies without mass: with their numbers, the forces on the
+/// bodies from a first one on, and the number of that one.
 pub(super) fn share_massless(
     threads: usize,
     bodies: &[u32],

@@ -34,7 +34,7 @@ pub(crate) struct RowContacts {
     /// One for each lane.
     lanes: Vec<Contacts<f64>>,
     near: Near,
-    /// What contact makes of points; none if they are joined by rods.
+    /// The tile that applies contact to points; none if rods join them.
     tile: Option<Tile>,
     /// The points that may have met a surface in a step, in any lane.
     points: Vec<u32>,

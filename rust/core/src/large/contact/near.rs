@@ -1,4 +1,4 @@
-//! Which points may have met a surface: a test of many side by side, which may name too many points but never too few.
+//! The points that may have met a surface: a test of many side by side, which may name too many points but never too few.
 
 #![allow(clippy::needless_range_loop, reason = "loops over lanes are written as the instructions that they become")]
 
@@ -7,7 +7,7 @@ use crate::{
     model::around::contact::{Contacts, Form, Reach},
 };
 
-/// What is tested side by side: numbers of eight points of one member, or of one or two points of several.
+/// Lanes of a test: numbers of eight points of one member, or of one or two points of several.
 const SIDE: usize = 8;
 
 type Vector = [f64; SIDE];
@@ -19,7 +19,7 @@ struct Wall {
     place: [Vector; 3],
     /// The offset, or the radius.
     size: Vector,
-    /// What rounding may add, beside its share of the size of what is tested.
+    /// The rounding error of a distance, beyond its share of the tested point's size.
     slack: Vector,
 }
 
@@ -84,7 +84,7 @@ struct Search<'a, const D: usize, const ONE: bool> {
     points: &'a mut Vec<u32>,
 }
 
-/// The numbers of so many points of one member, a vector for each direction.
+/// The coordinates of a vector of points of one member, a vector for each direction.
 #[inline(always)]
 fn apart<const D: usize>(points: &[[f64; D]; SIDE]) -> [Vector; D] {
     let mut vectors = [[0.0; SIDE]; D];
@@ -173,7 +173,7 @@ impl Wall {
 }
 
 impl<const D: usize, const ONE: bool> Search<'_, D, ONE> {
-    /// Tests the places from `i` on, of which so many are there.
+    /// Tests the `places` places from `i` on.
     #[inline(always)]
     fn vector(&mut self, [i, places]: [usize; 2], y0: impl Fn() -> [Vector; D], y: &[Vector; D]) {
         let (mut near, lanes) = ([0; SIDE], if ONE { 1 } else { self.near.lanes });

@@ -1,4 +1,4 @@
-//! What contact makes of points, many side by side: a tape of one point, whose lanes are the points that may have met a surface.
+//! Contact of many points side by side: a tape of one point, whose lanes are the points that may have met a surface.
 
 use std::sync::{Arc, LazyLock};
 
@@ -21,7 +21,7 @@ use crate::{
 /// How many points of one member go side by side: enough vectors that their roots and quotients overlap.
 const POINTS: usize = 32;
 
-/// Of the surfaces alone: systems that meet the same ones share the tape.
+/// Stages by the surfaces alone: systems that meet the same ones share the tape.
 static CACHE: LazyLock<Cache<Arc<Signature>, Stage>> = LazyLock::new(Cache::default);
 
 /// The tape of a point. Its state is v and y before the step, v and y after it, and whether the point met a surface.
@@ -45,7 +45,7 @@ fn stage(signature: &Arc<Signature>) -> Option<Arc<Stage>> {
     traced.ok()
 }
 
-/// What of a description is about surfaces.
+/// The part of a description that is about surfaces.
 fn of_surfaces<'a>(spec: &Spec<'a>) -> Spec<'a> {
     let whole = &spec.signature;
     let is_of_surface = |name: &str| name.starts_with("contact");

@@ -10,7 +10,7 @@ type Vector = [f64; SIDE];
 /// The bit of the sign, which is −0.
 const SIGN: u64 = 1 << 63;
 
-/// For each set of lanes its bits: all of those of a lane that is in it.
+/// The bits of each set of lanes: all of those of a lane that is in it.
 const LANES: [[u64; SIDE]; 1 << SIDE] = {
     let mut all = [[0; SIDE]; 1 << SIDE];
     let mut set = 0;
@@ -35,11 +35,11 @@ pub(crate) struct Rows {
     pub y: Aligned,
     /// Velocities, if there is damping.
     pub v: Aligned,
-    /// Of springs, in the order in which they are computed.
+    /// The stiffness of springs, in the order in which they are computed.
     pub stiffness: Aligned,
     /// k·ℓ₀
     pub held: Aligned,
-    /// Nothing if there is none.
+    /// The damping, empty if there is none.
     pub damping: Aligned,
     /// Forces on first ends, with a margin before and behind them.
     pub forces: Aligned,
@@ -161,7 +161,7 @@ impl<const D: usize, const DAMPED: bool> Forces<'_, D, DAMPED> {
         ends
     }
 
-    /// Ends anywhere.
+    /// The ends of springs anywhere.
     #[inline(always)]
     fn anywhere(y: &[[f64; D]], v: &[[f64; D]], numbers: &[[u32; SIDE]; 2]) -> Ends<D> {
         let mut ends = Ends::NONE;
@@ -178,7 +178,7 @@ impl<const D: usize, const DAMPED: bool> Forces<'_, D, DAMPED> {
         ends
     }
 
-    /// The sums of the forces on so many particles, one by one.
+    /// The sums of the forces on the `count` particles from `first` on, one by one.
     #[inline(always)]
     fn sums_of_singles(order: &Order, rows: &Rows, first: usize, count: usize) -> [Vector; D] {
         let mut sums = [[-0.0; SIDE]; D];
@@ -228,7 +228,7 @@ impl<const D: usize, const DAMPED: bool> Forces<'_, D, DAMPED> {
 }
 
 impl<const D: usize, const DAMPED: bool> Forces<'_, D, DAMPED> {
-    /// The rates of the particles from a place on, of which these are the sums of the forces.
+    /// Writes the rates of the particles from `at` on, from the sums of their forces.
     #[inline(always)]
     fn finish(rows: &Rows, at: usize, sums: [Vector; D], speeds: &[[f64; D]], out: &mut [[f64; D]]) {
         let by_mass = load(&rows.by_mass, at);

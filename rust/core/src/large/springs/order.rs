@@ -1,4 +1,4 @@
-//! In which order the springs of a net are computed, and from where each particle takes its forces.
+//! The order in which the springs of a net are computed, and the forces that each particle takes.
 //!
 //! A vector of springs or of particles loads fast only what lies side by side. In a lattice it mostly does: springs sorted by the
 //! distance of their ends' numbers, and then by their first end, form runs, in which both ends go up by one from spring to
@@ -7,7 +7,7 @@
 
 /// Springs or particles of a vector.
 pub(super) const SIDE: usize = 8;
-/// Before and behind the forces there is room for what a vector reaches beyond them.
+/// The margin before and behind the forces, for vectors that reach beyond them.
 pub(crate) const MARGIN: usize = SIDE;
 /// Forces that a vector of them must give to particles on average; with fewer it is faster to add them one by one.
 const MIN_FORCES_PER_ADDEND: usize = 2;
@@ -43,7 +43,7 @@ pub(crate) struct Single {
 
 /// The order of a net.
 pub(crate) struct Order {
-    /// Of each place the spring that is computed there; the last are filled with the last spring.
+    /// For each place the spring that is computed there; the last are filled with the last spring.
     pub springs: Vec<u32>,
     /// Vectors of springs in runs.
     pub runs: Vec<Run>,
@@ -53,11 +53,11 @@ pub(crate) struct Order {
     pub first_other: usize,
     /// All vectors of forces that particles add, particles after particles.
     pub addends: Vec<Addend>,
-    /// Behind the addends of each vector of particles.
+    /// The end of the addends of each vector of particles.
     pub until: Vec<u32>,
     /// Forces one by one, particle after particle, for vectors of particles whose forces hardly ever lie side by side.
     pub singles: Vec<Single>,
-    /// Behind the single forces of each particle.
+    /// The end of the single forces of each particle.
     pub until_single: Vec<u32>,
 }
 
@@ -67,7 +67,7 @@ fn ends_of(pairs: &[u32], spring: u32) -> [u32; 2] {
 }
 
 impl Order {
-    /// Of the springs between these pairs of particles, of which there are `n`; what is fixed adds no forces.
+    /// The order of the springs between these pairs of the `n` particles; no forces are added for fixed ones.
     pub(crate) fn new(n: usize, pairs: &[u32], is_fixed: &[bool]) -> Order {
         let mut springs: Vec<u32> = (0..(pairs.len() / 2) as u32).collect();
         let key = |spring: &u32| {

@@ -1,4 +1,4 @@
-//! What is around a system: parts, each of which is a system that wraps another, or acts on the state after a step.
+//! The parts around a system: each is a system that wraps another, or acts on the state after a step.
 //!
 //! `parts` lists them from the inside out. A new kind is a file here and a line there; see docs/developing/adding.md.
 

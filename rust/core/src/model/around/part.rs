@@ -1,4 +1,4 @@
-//! What each kind of part says of itself.
+//! The description of a kind of part.
 
 use crate::{
     error::Error,

@@ -1,8 +1,8 @@
-//! A sampled controller: every so many steps it reads the state and sets parameters of the system, which it holds in between.
+//! A sampled controller: every n steps it reads the state and sets parameters of the system, which it holds in between.
 //!
-//! What it remembers stands behind the state, in this order: how many steps ago it read the state last; its own state; what it
-//! has computed and not put out yet, of each sample a number for each that it sets, the oldest first; and, where it puts
-//! something out between samples, what it holds. `reference/sampled.py` has the same.
+//! Its memory follows the state, in this order: the number of steps since it read the state; its own state; its results that are
+//! not put out yet, for each sample a number for each row that it sets, the oldest first; and, where it puts something out
+//! between samples, the numbers that it holds. `reference/sampled.py` has the same.
 
 use super::part::{Attempts, Part};
 use crate::{
@@ -24,7 +24,7 @@ const SETS: &str = "controller.sets";
 const WAITING: &str = "controller.waiting";
 /// How many steps there are from one sample to the next, less one.
 const LAST: &str = "controller.last";
-/// So many steps after a sample results are put out; not given where that is at a sample.
+/// Steps from a sample until results are put out; not given where that is at a sample.
 const LATER: &str = "controller.later";
 
 /// The part: parameters are replaced before the system is made, so there is nothing to wrap.
@@ -42,7 +42,7 @@ pub(crate) fn part<N: Number>() -> Part<N> {
     }
 }
 
-/// An error unless it sets what is given, and reads only that and its own state.
+/// An error unless it sets parameters of the model, and reads only those and its own state.
 fn check(_: &Kind, signature: &Signature, shape: Shape) -> Result<(), Error> {
     let Some(controller) = &signature.controller else { return Ok(()) };
     signature.expect(LAST, 1)?;
@@ -77,7 +77,7 @@ pub(crate) fn sets(signature: &Signature, name: &str) -> Option<usize> {
     is_set.then(|| signature.count(name))
 }
 
-/// What stands in each row between two steps.
+/// Sets the controlled parameters to the numbers that the controller holds between two steps.
 pub(crate) fn set(p: &mut Parameters<Symbol>, memory: &Block<Symbol>) {
     if p.signature.controller.is_none() {
         return;
@@ -88,7 +88,7 @@ pub(crate) fn set(p: &mut Parameters<Symbol>, memory: &Block<Symbol>) {
     rows.iter().enumerate().for_each(|(i, row)| p.numbers[*row] = memory[held + i]);
 }
 
-/// What it remembers after a step from a state. It sets the parameters for the step.
+/// The memory of the controller after a step from a state. It sets the parameters for the step.
 pub(crate) fn next(
     p: &mut Parameters<Symbol>,
     t: Symbol,
@@ -126,7 +126,7 @@ pub(crate) fn next(
     next
 }
 
-/// The system with what a controller set, which does not change within the step whatever it was made of.
+/// The system with the controlled parameters, which do not change within the step whatever they were computed from.
 pub(crate) fn held(p: &Parameters<Symbol>, system: Box<dyn System<Symbol>>) -> Box<dyn System<Symbol>> {
     if p.signature.controller.is_none() {
         return system;

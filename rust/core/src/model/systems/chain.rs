@@ -13,7 +13,7 @@ use crate::{
     tape::number::Number,
 };
 
-/// What the core knows of it. Given: `stiffness` of the n + 1 springs, `mass` of the n masses.
+/// Parameters: `stiffness` of the n + 1 springs, `mass` of the n masses.
 pub const KIND: Kind = Kind {
     name: "chain",
     shape,

@@ -31,14 +31,14 @@ pub const KIND: Kind = Kind {
     make,
 };
 
-/// The size of the blocks, or an error if the operations do not belong to what is given.
+/// The size of the blocks, or an error if the operations do not fit the parameters.
 pub(crate) fn fit(equations: &Equations, signature: &Signature) -> Result<Shape, Error> {
     let [v, y] = equations.blocks();
     check(equations, signature, v + y)?;
     Ok(Shape { v, y })
 }
 
-/// An error unless the operations belong together, and read only what is given and so many numbers of the state.
+/// An error unless the operations are well formed, and read only known parameters and `states` numbers of the state.
 pub(crate) fn check(equations: &Equations, signature: &Signature, states: usize) -> Result<(), Error> {
     if equations.is_sound(signature.parameters(), signature.tables.len(), states) {
         Ok(())
@@ -60,7 +60,7 @@ fn shape(signature: &Signature) -> Result<Shape, Error> {
 
 /// A number on which every operation is defined.
 pub trait Operand: Number {
-    /// What an operation makes.
+    /// The result of an operation.
     fn made(op: Op, operands: [Self; 3]) -> Self;
 
     /// Whether a series is traced, which must know what is a function of what.

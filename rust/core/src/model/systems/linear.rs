@@ -12,8 +12,8 @@ use crate::{
     tape::number::Number,
 };
 
-/// What the core knows of it. Given: `n_v`, how many of the states are in v; `inputs`, how many, and `inputs[0]`, …; `rows`,
-/// [A B] by rows; the word `kind` is `acceleration` if ẏ is v times a number and v̇ does not depend on v.
+/// Parameters: `n_v`, how many of the states are in v; `inputs`, how many, and `inputs[0]`, …; `rows`, [A B] by rows; the word
+/// `kind` is `acceleration` if ẏ is v times a number and v̇ does not depend on v.
 pub const KIND: Kind = Kind {
     name: "linear",
     shape,

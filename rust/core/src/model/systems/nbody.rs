@@ -30,9 +30,8 @@ use crate::{
     tape::number::Number,
 };
 
-/// What the core knows of it. Given: the word `force`; the whole number `dim`; `masses` and `strength`, G·m, of the bodies;
-/// `softening`, ε; the whole number `fused`, 1 if products are; the list `massless` of bodies without mass, in ascending order,
-/// if there are any.
+/// Parameters: the word `force`; the whole number `dim`; `masses` and `strength`, G·m, of the bodies; `softening`, ε; the whole
+/// number `fused`, 1 if products are; the optional list `massless` of bodies without mass, in ascending order.
 pub const KIND: Kind = Kind { name: "nbody", shape, velocity_term: |_| None, quantities, controllable: true, operations, make };
 
 fn shape(signature: &Signature) -> Result<Shape, Error> {
@@ -159,7 +158,7 @@ impl<N: Number> Bodies<N> {
         (dv, potential)
     }
 
-    /// The same of bodies with mass among each other.
+    /// The accelerations and potentials of bodies with mass among each other.
     fn among(&self, rounding: Rounding, y: &Block<N>, with_wells: bool) -> (Vec<N>, Vec<N>) {
         let (bodies, n, dim, zero) = (&self.massive, self.massive.len(), self.dim, N::of(0.0));
         // Sums of pushes start from −0, for x + −0 is x, also where x is a zero: the first term costs no operation.
@@ -195,7 +194,7 @@ impl<N: Number> Bodies<N> {
         (dv, potential)
     }
 
-    /// Of each body but the first its share in the mass of all up to it, and G times that mass (Jacobi's hierarchy); None under
+    /// For each body but the first its share in the mass of all up to it, and G times that mass (Jacobi's hierarchy); None under
     /// another force than Newton's, which has no Kepler motions.
     fn hierarchy(&self) -> Option<Vec<(N, N)>> {
         if self.law != Law::Newton || self.masses.len() < 2 {
@@ -249,7 +248,7 @@ impl<N: Number> Bodies<N> {
         Energies { dv, kinetic, whole }
     }
 
-    /// What is said of each body with mass in turn: its mass, its place and its velocity.
+    /// The mass, the place and the velocity of each body with mass in turn.
     fn each<'a>(&'a self, v: &'a Block<N>, y: &'a Block<N>) -> impl Iterator<Item = (N, &'a [N], &'a [N])> {
         let row = |block: &'a Block<N>, i: usize| &block.as_slice()[self.dim * i..][..self.dim];
         self.massive.iter().map(move |&i| (self.masses[i], row(y, i), row(v, i)))

@@ -15,7 +15,7 @@ use crate::{
     tape::number::Number,
 };
 
-/// What the core knows of it. Given: `form`; `omega`, `damping` or `drag` (maybe); the inputs `x` and `a` (maybe).
+/// Parameters: `form`; `omega`; optional `damping` or `drag`; optional inputs `x` and `a`.
 pub const KIND: Kind = Kind {
     name: "oscillator",
     shape,

@@ -13,7 +13,7 @@ use crate::{
     tape::number::Number,
 };
 
-/// What the core knows of it. Given: the whole number `dim`; `masses` of the points; `gravity`, a vector; `drag` (maybe).
+/// Parameters: the whole number `dim`; `masses` of the points; `gravity`, a vector; optional `drag`.
 pub const KIND: Kind = Kind {
     name: "particles",
     shape,

@@ -11,7 +11,7 @@ use crate::{
     tape::number::Number,
 };
 
-/// What the core knows of it. Given: `omega`, `damping` (maybe); the input `a` (maybe).
+/// Parameters: `omega`; optional `damping`, input `a`.
 pub const KIND: Kind = Kind {
     name: "pendulum",
     shape,

@@ -10,7 +10,7 @@ use crate::{
     tape::number::Number,
 };
 
-/// What the core knows of it. Given: `length` and `gravity`; the word `keeps` (maybe), and for a control its `strength`.
+/// Parameters: `length` and `gravity`; the optional word `keeps`, and for a control its `strength`.
 pub const KIND: Kind = Kind {
     name: "pendulum_3d",
     shape,

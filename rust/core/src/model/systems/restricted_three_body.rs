@@ -12,7 +12,7 @@ use crate::{
     tape::number::Number,
 };
 
-/// What the core knows of it. Given: `mu`.
+/// Parameters: `mu`.
 pub const KIND: Kind = Kind {
     name: "restricted_three_body",
     shape,

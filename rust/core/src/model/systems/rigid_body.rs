@@ -12,9 +12,9 @@ use crate::{
     tape::number::Number,
 };
 
-/// What the core knows of it. Given: `inertia`, three principal moments; `damping`, one for each axis (maybe); the inputs
-/// `torque[0]`, … along body axes and `space_torque[0]`, … along those of space (each maybe); `weight` and `centre` (maybe,
-/// both); the word `keeps`, "control" with its `strength`, or "projection".
+/// Parameters: `inertia`, three principal moments; optional `damping`, one for each axis; optional inputs `torque[0]`, … along
+/// body axes and `space_torque[0]`, … along those of space; optional `weight` and `centre`, both or none; the word `keeps`,
+/// "control" with its `strength`, or "projection".
 pub const KIND: Kind = Kind {
     name: "rigid_body",
     shape,
@@ -104,7 +104,7 @@ fn turned<N: Number>(q: &Block<N>) -> ([Vector<N>; 3], N) {
     ([x, y, z], square(q))
 }
 
-/// The sum of what is there.
+/// The sum of a vector and the total so far, if there is one.
 fn plus<N: Number>(total: Option<Vector<N>>, more: Vector<N>) -> Option<Vector<N>> {
     Some(total.map_or(more, |total| std::array::from_fn(|i| total[i] + more[i])))
 }

@@ -13,9 +13,9 @@ use crate::{
     tape::number::Number,
 };
 
-/// What the core knows of it. Given: the whole numbers `dim` and `rods`, and of each rod its ends, `rods[k][0]` and `rods[k][1]`;
-/// `masses` of the points, `lengths` of the rods, coordinates of the `anchors` (maybe), `gravity`; the word `keeps` (maybe), and
-/// for a control its `strength`. Anchors count on from the last point, and are first ends only.
+/// Parameters: the whole numbers `dim` and `rods`, and of each rod its ends, `rods[k][0]` and `rods[k][1]`; `masses` of the
+/// points, `lengths` of the rods, optional coordinates of the `anchors`, `gravity`; the optional word `keeps`, and for a control
+/// its `strength`. Anchors count on from the last point, and are first ends only.
 pub const KIND: Kind = Kind {
     name: "rods",
     shape,
@@ -33,7 +33,7 @@ pub const KIND: Kind = Kind {
 /// 2·10⁻⁴, 2·10⁻⁸ and 2·10⁻¹⁶, which is rounding.
 const CORRECTIONS: usize = 3;
 
-/// What keeps the lengths.
+/// The way in which the lengths are kept.
 #[derive(Clone, Copy)]
 pub(crate) enum Keeps<N: Number> {
     Nothing,
@@ -155,13 +155,13 @@ impl<N: Number> Links<N> {
         Links::of(dim, ends(p.signature), masses, p.numbers("lengths").to_vec(), p.numbers("anchors").to_vec())
     }
 
-    /// From the dimensions, the ends of each rod, the points' masses, the rods' lengths and the anchors.
+    /// Rods from the dimensions, the ends of each rod, the points' masses, the rods' lengths and the anchors.
     pub(crate) fn of(dim: usize, ends: Vec<[usize; 2]>, masses: Vec<N>, lengths: Vec<N>, anchors: Vec<N>) -> Self {
         let (inverse, minus) = [1.0, -1.0].map(|one| masses.iter().map(|m| N::of(one) / *m).collect()).into();
         Links { dim, ends, masses, inverse, minus, lengths, anchors }
     }
 
-    /// Those of a system, if it has any.
+    /// The rods of the model, if it has rods.
     pub(crate) fn from_parameters(p: &Parameters<N>) -> Option<Self> {
         match p.signature.system.as_str() {
             "rods" => Some(Links::new(p)),
@@ -225,14 +225,14 @@ impl<N: Number> Links<N> {
         }
     }
 
-    /// What the pulls of the rods do to each point.
+    /// The sum of the pulls of the rods on each point.
     fn pushed(&self, d: &Vectors<N>, pulls: &[N]) -> Vectors<N> {
         let pulls: Vec<Option<N>> = pulls.iter().copied().map(Some).collect();
         // `shape` has seen that each point has a rod.
         self.pushed_by_some(d, &pulls).into_iter().map(Option::unwrap_or_default).collect()
     }
 
-    /// The same of some pulls; `None` for points that do not feel any.
+    /// As `pushed`, for some pulls; `None` for points that none acts on.
     pub(crate) fn pushed_by_some(&self, d: &Vectors<N>, pulls: &[Option<N>]) -> Vec<Option<Vec<N>>> {
         let mut sums: Vec<Option<Vec<N>>> = vec![None; self.masses.len()];
         for (([a, b], span), pull) in self.ends.iter().zip(d).zip(pulls) {

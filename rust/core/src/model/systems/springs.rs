@@ -19,9 +19,9 @@ use crate::{
     tape::number::Number,
 };
 
-/// What the core knows of it. Given: the whole numbers `n`, of particles, and `dim`; the lists `pairs`, both ends of each spring,
-/// and `fixed`, particles; `masses` and `drag` of the particles, `stiffness`, `rest` and `damping` of the springs, each one or
-/// one for all; `gravity`, a vector.
+/// Parameters: the whole numbers `n`, of particles, and `dim`; the lists `pairs`, both ends of each spring, and `fixed`,
+/// particles; `masses` and `drag` of the particles, `stiffness`, `rest` and `damping` of the springs, each one or one for all;
+/// `gravity`, a vector.
 pub const KIND: Kind = Kind { name: "springs", shape, velocity_term, quantities, controllable: true, operations, make };
 
 fn shape(signature: &Signature) -> Result<Shape, Error> {
@@ -155,7 +155,7 @@ impl<N: Number> Springs<N> {
         &self.fall
     }
 
-    /// From the one end of a spring to the other.
+    /// The vector from the one end of a spring to the other.
     fn across(&self, s: usize, places: &[N]) -> Vec<N> {
         let [i, j] = self.ends[s].map(|particle| self.dim * particle);
         (0..self.dim).map(|c| places[j + c] - places[i + c]).collect()

@@ -1,4 +1,4 @@
-//! Events of adaptive steps: quantities are looked at after every attempt, in the lanes.
+//! Events of adaptive steps: quantities are checked after every attempt, in the lanes.
 
 use std::sync::Arc;
 
@@ -14,12 +14,11 @@ use crate::{
     step::pace::{Pace, length},
 };
 
-/// What an event needs in the lanes.
+/// The quantity of an event in the lanes.
 struct Quantity {
     value: Filled,
     slope: Option<Filled>,
-    /// The quantity at the state, and after the attempt before; NaN where that is not known. The slope at the state, and
-    /// at the one before.
+    /// The quantity at the state and after the attempt before, NaN where not known; the slope at the state and at the one before.
     now: Vec<f64>,
     before: Vec<f64>,
     slopes: Vec<f64>,
@@ -99,7 +98,7 @@ impl<'a> Looks<'a> {
         self.longest.iter().skip(lane).step_by(self.t.len()).copied().collect()
     }
 
-    /// Takes a member into a lane, which an earlier run looked at until that time.
+    /// Takes a member into a lane, which an earlier run checked up to the time `since`.
     pub(super) fn begin(&mut self, lane: usize, member: usize, since: f64) {
         for (quantity, event) in self.quantities.iter_mut().zip(&self.events.events) {
             quantity.value.prepare_lane(&event.quantity.parameters, lane, member);

@@ -1,4 +1,4 @@
-//! Events of fixed steps: the states after all steps of a group are looked at, some steps at a time.
+//! Events of fixed steps: the states after all steps of a group are checked, some steps at a time.
 
 use std::{ops::Range, sync::Arc};
 
@@ -15,27 +15,27 @@ use crate::{
     tape::real::{Precision, Real},
 };
 
-/// So many steps are made at a time: their states stay in a cache.
+/// Steps that are made at a time: their states stay in a cache.
 const STEPS_AT_ONCE: i64 = 64;
 
-/// Where all lanes go on from the first step in which one is changed, so many are made at a time, at least and at most.
+/// Steps that are made at a time, at least and at most, where all lanes go on from the first step in which one is changed.
 const MADE_AT_ONCE: [i64; 2] = [4, 256];
 
-/// Where the steps notice what may occur, so many are made at a time, at first and at least and at most; and no more than so many
-/// of all members of a group, beside which what is read of them is little.
+/// Steps that are made at a time, at first and at least and at most, where the steps notice what may occur; and the most of all
+/// members of a group, beside which reading the flags takes little time.
 const NOTICED_AT_FIRST: i64 = 16;
 const NOTICED_AT_ONCE: [i64; 2] = [4, 64];
 const NOTICED_OF_GROUP: i64 = 1 << 11;
-/// If more than one step for so many members would be repeated, half as many are made at a time; if less than a fourth of it,
+/// If more than one step per this many members would be repeated, half as many are made at a time; if less than a fourth of that,
 /// twice as many.
 const FEWER_AGAIN: usize = 2;
 
 /// The quantities of a group while it is stepped.
 pub struct Looks<'w, 'a> {
     watch: &'w mut Watch<'a>,
-    /// Of each event.
+    /// The tile of each event.
     tiles: Vec<Filled>,
-    /// Its quantity at the state, and one step before; NaN where that is not known.
+    /// The quantity of each event at the state, and one step before; NaN where that is not known.
     now: Vec<Vec<f64>>,
     before: Vec<Vec<f64>>,
     /// The states before each of some steps and after the last, v before y, in rows of lanes.
@@ -43,7 +43,7 @@ pub struct Looks<'w, 'a> {
     carried: Vec<f64>,
     /// The quantities in these states.
     values: Vec<f64>,
-    /// What the lanes carry in place of v in each of these states, and what the method keeps, if events change some.
+    /// The carry in place of v, and the blocks that the method keeps, in each of these states, if events change some.
     slots: Vec<f64>,
     /// States that events gave to members, of a method that carries something else than v: from one step on until before another.
     given: Vec<Vec<([i64; 2], Numbers)>>,
@@ -54,27 +54,27 @@ pub struct Looks<'w, 'a> {
     together: i64,
     /// Where members stopped.
     stops: Vec<Option<Stop>>,
-    /// What is known of each member, if events change states.
+    /// The search state of each member, if events change states.
     memories: Vec<Memory>,
-    /// All lanes are looked at together after each step.
+    /// Whether all lanes are checked together after each step.
     in_lanes: bool,
 }
 
-/// What is known of the members of a world between its calls.
+/// The event search of a world between its calls.
 #[derive(Debug, Default)]
 pub struct Between {
     members: usize,
     /// v and y at the end of the last call, by rows.
     left: [Vec<f64>; 2],
-    /// Of each event each member's quantity one step before; NaN where that is not known.
+    /// For each event each member's quantity one step before; NaN where that is not known.
     before: Vec<Vec<f64>>,
-    /// If events change states: what is known of each member, by groups, and the states of those at rest.
+    /// If events change states: the search state of each member, by groups, and the states of those at rest.
     memories: Vec<Vec<Memory>>,
     rest: Vec<Option<Numbers>>,
 }
 
 impl Between {
-    /// Which members of a group the caller moved since the last call, whose states are in these rows.
+    /// Whether the caller moved each member of a group since the last call; the members' states are in these rows.
     fn moved(&self, state: [&[f64]; 2], members: Range<usize>) -> Vec<bool> {
         let mut moved = vec![false; members.len()];
         for (now, left) in state.iter().zip(&self.left) {
@@ -117,7 +117,7 @@ impl Between {
 }
 
 impl<'w, 'a> Looks<'w, 'a> {
-    /// For so many members from `first` on.
+    /// A search for the `count` members from `first` on.
     pub(super) fn new(watch: &'w mut Watch<'a>, notices: bool, lanes: usize, first: usize, count: usize) -> Self {
         let (events, remembered) = (watch.events(), if watch.changes() { count } else { 0 });
         let memories = (first..first + remembered).map(|member| Memory::new(member, events)).collect();
@@ -125,7 +125,7 @@ impl<'w, 'a> Looks<'w, 'a> {
         Looks { in_lanes, ..Looks::with(watch, notices, lanes, (first, count), memories) }
     }
 
-    /// With what is known of them.
+    /// A search with the members' search states.
     fn with(
         watch: &'w mut Watch<'a>,
         notices: bool,
@@ -242,7 +242,7 @@ fn fill<T: Real>(tile: &mut Filled, (on, events): (&Stepped<T>, &Events), state:
     }
 }
 
-/// Whether an event occurs at a known time within so many steps of a member, from the k-th on.
+/// Whether an event occurs at a known time within `n` steps of a member, from the k-th on.
 fn comes(events: &Events, member: usize, (k, n, h): (i64, i64, f64)) -> bool {
     let [t, t_end] = [k, k + n].map(|number| events.begin.at(member) + number as f64 * h);
     events.comes(member, t, t_end)
@@ -344,7 +344,7 @@ impl Looks<'_, '_> {
         }
     }
 
-    /// What is noticed begins with the quantities at the present state and one step before.
+    /// Starts the noticing with the quantities at the present state and one step before.
     fn begin_to_notice<T: Real>(&mut self, on: &mut Stepped<T>) {
         if !self.notices {
             return;
@@ -378,7 +378,7 @@ impl Looks<'_, '_> {
             }
             self.find_quantities(on, k, n);
             let (mut made, mut changed) = (n, Vec::new());
-            // Where nothing happens in any lane, what is known of members is brought up to date later.
+            // Where nothing happens in any lane, the members' search states are updated later.
             let (mut is_fresh, mut is_behind) = (true, false);
             for row in 0..n {
                 self.wake(on, k + row as i64, &mut changed);
@@ -423,7 +423,7 @@ impl Looks<'_, '_> {
         &self.values[(row * events + e) * lanes..][..lanes]
     }
 
-    /// Whether no event may occur in one of so many steps, of which it is not the first, in any lane; all numbers are finite.
+    /// Whether no event may occur in step `row` of `steps` steps, which is not the first, in any lane; all numbers are finite.
     fn is_quiet(&self, row: usize, steps: usize) -> bool {
         let block = self.states.len() / (steps + 1);
         let may = |e: usize| any_may_change([row - 1, row, row + 1].map(|row| self.row_of(row, e)));
@@ -431,8 +431,8 @@ impl Looks<'_, '_> {
         are_finite && !self.watch.motion.events.has_times() && !(0..self.tiles.len()).any(may)
     }
 
-    /// Brings what is known of members, but of those that are at rest or were woken, to one of the states that are kept, not the
-    /// first, before which nothing happened to them.
+    /// Updates the members' search states, but of those that are at rest or were woken, to one of the states that are kept, not
+    /// the first, before which nothing happened to them.
     fn catch_up(&mut self, row: usize, woken: &[(usize, Numbers)]) {
         for lane in 0..self.memories.len() {
             if self.memories[lane].rests() || woken.iter().any(|(other, _)| *other == lane) {
@@ -542,7 +542,7 @@ impl Looks<'_, '_> {
         }
     }
 
-    /// Brings lanes to where they were after so many of the steps that were made, at step `k`, some of them in another state.
+    /// Brings lanes back to where they were after `made` of the steps, at step `k`, some of them in another state.
     fn begin_anew<T: Real>(&mut self, on: &mut Stepped<T>, k: i64, made: usize, changed: Vec<(usize, Numbers)>) {
         if changed.is_empty() {
             return;
@@ -649,7 +649,7 @@ impl Looks<'_, '_> {
         }
     }
 
-    /// Chooses how many steps are made together, after so many of members have to be repeated.
+    /// Chooses how many steps are made together, after `again` steps of members have to be repeated.
     fn choose_together<T: Real>(&mut self, again: usize, on: &Stepped<T>) {
         let [least, most] = NOTICED_AT_ONCE;
         if again * FEWER_AGAIN > on.count {
@@ -659,7 +659,7 @@ impl Looks<'_, '_> {
         }
     }
 
-    /// What is noticed of these lanes goes on with the quantities that are remembered.
+    /// Continues the noticing in these lanes with the remembered quantities.
     fn remember<T: Real>(&self, on: &mut Stepped<T>, places: impl Iterator<Item = usize>) {
         if !self.notices {
             return;

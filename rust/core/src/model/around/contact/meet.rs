@@ -1,4 +1,4 @@
-//! What happens to a point that met a surface.
+//! The effect of a surface on a point that met it.
 
 use super::surface::{ContactMode, Place, Surface, difference, dot, magnitude};
 use crate::tape::number::Number;
@@ -6,7 +6,7 @@ use crate::tape::number::Number;
 /// Operations of a point that meets a surface, approximately.
 pub(crate) const OPERATIONS: usize = 60;
 
-/// What a step of the method did to a point, whatever the method.
+/// The effect of a step of the method on a point, whatever the method.
 pub(crate) struct Step<N: Number> {
     h: N,
     v0: Vec<N>,
@@ -20,7 +20,7 @@ pub(crate) struct Step<N: Number> {
 }
 
 impl<N: Number> Step<N> {
-    /// From the states before and after.
+    /// The step between the states before and after.
     pub(crate) fn new(h: N, [v0, y0]: [&[N]; 2], [v1, y1]: [&[N]; 2]) -> Step<N> {
         let lag = (0..y0.len()).map(|i| (y1[i] - y0[i]) / h - N::of(0.5) * (v0[i] + v1[i])).collect();
         let kick = difference(v1, v0);
@@ -28,7 +28,7 @@ impl<N: Number> Step<N> {
     }
 }
 
-/// What contact makes of a point.
+/// The effect of contact on a point.
 pub(crate) struct Change<N: Number> {
     /// Its velocity along the normal.
     pub speed: N,

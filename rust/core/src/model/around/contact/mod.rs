@@ -111,7 +111,7 @@ pub struct Contacts<N: Number> {
     dim: usize,
     fixed: Vec<u32>,
     surfaces: Vec<Surface<N>>,
-    /// If the points are joined by rods.
+    /// The rods, if they join the points.
     rods: Option<RodContacts<N>>,
     /// Whether the energy is compared: along one plane without friction it is right by itself.
     is_limited: bool,
@@ -132,14 +132,14 @@ impl<N: Number> Contacts<N> {
         self.rods.is_some()
     }
 
-    /// What becomes of points on rods, in place. The state before the step comes first.
+    /// Applies contact to points on rods, in place. The state before the step comes first.
     pub(crate) fn resolve_joined(&self, before: [&[N]; 2], [v, y]: [&mut [N]; 2]) {
         if let Some(rods) = &self.rods {
             rods.resolve(&self.surfaces, before, v, y);
         }
     }
 
-    /// What becomes of a point, in place, and whether it met a surface. The state before the step comes first.
+    /// Applies contact to a point, in place, and returns whether it met a surface. The state before the step comes first.
     pub(crate) fn resolve_point(&self, before: [&[N]; 2], [v, y]: [&mut [N]; 2]) -> Option<N::Truth> {
         let step = Step::new(self.h, before, [v, y]);
         let mut touched: Option<N::Truth> = None;
@@ -158,7 +158,7 @@ impl<N: Number> Contacts<N> {
         !is_among(&self.fixed, point)
     }
 
-    /// Which points met a surface in a step, None for those that no surface acts on, and the state after that.
+    /// The points that met a surface in a step, None for those that no surface acts on, and the state after that.
     fn resolve(&self, before: [&Block<N>; 2], [mut v, mut y]: [Block<N>; 2]) -> (Vec<Option<N::Truth>>, [Block<N>; 2]) {
         let mut touched = vec![None; y.len() / self.dim];
         if self.are_joined() {
@@ -221,7 +221,7 @@ pub struct Carry<'a> {
     finish: Option<&'a Program>,
 }
 
-/// Those of a method.
+/// The programs that carry the velocities of this method across a bounce.
 pub fn carry(method: &Method, choice: usize) -> Carry<'_> {
     Carry { start: method.start(choice), finish: method.finish(choice) }
 }
@@ -234,7 +234,7 @@ pub(crate) struct Springs<N: Number> {
 }
 
 impl<N: Number> Springs<N> {
-    /// Those that are given; None without any.
+    /// The springs of this model's surfaces, or None.
     pub(crate) fn new(p: &Parameters<N>) -> Option<Springs<N>> {
         let surfaces = surface::all(p, |way| way == ContactMode::Spring);
         (!surfaces.is_empty()).then(|| Springs { dim: dimensions(p.signature), fixed: fixed(p.signature), surfaces })
@@ -250,7 +250,7 @@ impl<N: Number> Springs<N> {
         }
     }
 
-    /// The same in D directions, to the points between those that are fixed.
+    /// The pushes in D directions, to the points between those that are fixed.
     #[inline(always)]
     fn push_points<const D: usize>(&self, y: &[N], dv: &mut [N]) {
         let (y, dv) = (y.as_chunks::<D>().0, dv.as_chunks_mut::<D>().0);

@@ -1,6 +1,6 @@
 //! Contact of points that are joined by rods: impulses of surfaces and pulls of rods are found together.
 //!
-//! What is computed, and why, is in `reference/rod_contact.py` and docs/howto/contact.md.
+//! The formulas, and the reasons for them, are in `reference/rod_contact.py` and docs/howto/contact.md.
 
 use super::{
     joined::{Column, Joined, add},
@@ -16,7 +16,7 @@ use crate::{
     tape::number::Number,
 };
 
-/// Points that surfaces have changed together are visited so many times.
+/// Visits of points that surfaces have changed together.
 const SWEEPS: usize = 10;
 
 /// Rounds in which points are put on surfaces and rods are given their lengths, and the visits of a round.
@@ -26,13 +26,13 @@ const VISITS: usize = 3;
 /// Below this share of 1/m of the point alone, 1/m at a contact is rounding: rods hold the point in that direction.
 const HELD: f64 = 1.0 / (1u64 << 40) as f64;
 
-/// Up to so many times the exactness of its distance, a point that begins behind a surface is lifted onto it: rounding, added up.
+/// A point at most this many rounding errors of its distance behind a surface at the start is lifted onto it: rounding, added up.
 const SHALLOW: f64 = (1u64 << 20) as f64;
 
-/// Of rods that had so much of the square of their speeds left by contact, only rounding is left: they rest.
+/// Rods rest if contact leaves less than this share of the square of their speeds: only rounding is left.
 const REST: f64 = 1.0 / ((1u128 << 90) as f64);
 
-/// Approximate number of operations that surfaces add to a step of so many points on so many rods.
+/// Approximate number of operations that surfaces add to a step of `points` points on rods.
 pub(crate) fn operations(signature: &Signature, points: usize, dim: usize) -> usize {
     let (surfaces, rods) = (signature.whole("contacts"), signature.whole("rods").max(1));
     let rough = (0..surfaces).filter(|i| signature.has(&format!("contact_{i}_friction"))).count();
@@ -54,13 +54,13 @@ struct Contact<'a, N: Number> {
     aim: N,
     /// The distance below which it is not left.
     low: N,
-    /// By a unit impulse along the normal.
+    /// The change of all velocities by a unit impulse along the normal.
     column: Column<N>,
     /// The velocity of the point itself along the normal by that impulse, infinite where there is no contact.
     give: N,
-    /// The same, infinite only where rods hold the point.
+    /// This velocity, infinite only where rods hold the point.
     yields: N,
-    /// Directions along the surface with the columns of these, and what they do to each other; with friction.
+    /// Directions along the surface with the columns of these, and the factored matrix of their mutual effects; with friction.
     tangents: Vec<(Vec<N>, Column<N>)>,
     grip: Option<Factors<N>>,
 }
@@ -109,7 +109,7 @@ impl<N: Number> RodContacts<N> {
         Some(RodContacts { h: p.h, links, gravity: p.number("gravity"), groups })
     }
 
-    /// What becomes of the points after a step, in place. The state before the step comes first.
+    /// Applies contact to the points after a step, in place. The state before the step comes first.
     pub(crate) fn resolve(&self, surfaces: &[Surface<N>], before: [&[N]; 2], v: &mut [N], y: &mut [N]) {
         let after = [v.to_vec(), y.to_vec()];
         let after = [&after[0][..], &after[1][..]];
@@ -138,7 +138,7 @@ impl<N: Number> RodContacts<N> {
         &block[i * self.links.dim..][..self.links.dim]
     }
 
-    /// Each point with each surface.
+    /// The contacts of each point with each surface.
     fn contacts<'a>(
         &self,
         surfaces: &'a [Surface<N>],
@@ -241,9 +241,9 @@ impl<N: Number> RodContacts<N> {
         Joined::new(&self.links, y)
     }
 
-    /// No more energy of joined points than before the step, or after it without contact.
+    /// Limits the energy of joined points to that before the step, or after it without contact.
     ///
-    /// What they have beyond is taken from their velocities. Where even at rest they would have more, they stay where they were.
+    /// The excess is taken from their velocities. Where even at rest they would have more, they stay where they were.
     fn limit(&self, points: &[usize], contacts: &[Contact<N>], before: [&[N]; 2], after: [&[N]; 2], made: (&mut [N], &mut [N])) {
         let (zero, one, (v, y)) = (N::of(0.0), N::of(1.0), made);
         let touching = contacts.iter().filter(|each| points.contains(&each.point)).map(|each| each.touches);
@@ -285,7 +285,7 @@ fn visit<N: Number>(each: &Contact<N>, give: N, impulse: &mut N, v: &mut [N]) {
     *impulse += more;
 }
 
-/// All impulses, and the velocities after them, in place.
+/// Finds all impulses, and sets the velocities after them.
 fn strike<N: Number>(contacts: &[Contact<N>], v: &mut [N]) -> Impulses<N> {
     let (zero, one) = (N::of(0.0), N::of(1.0));
     let shear = contacts.iter().map(|each| vec![zero; each.tangents.len()]).collect();

@@ -6,18 +6,18 @@ use crate::{
     tape::number::Number,
 };
 
-/// A distance is known to within so many times the numbers that it is computed from: eight roundings.
+/// The relative error of a distance, of the numbers that it is computed from: eight roundings.
 const ROUNDING: f64 = 1.0 / (1u64 << 50) as f64;
 
-/// The same for numbers of 32 bits.
+/// The relative error of a distance in numbers of 32 bits.
 const SINGLE_ROUNDING: f64 = 1.0 / (1u64 << 21) as f64;
 
-/// That of these numbers.
+/// The relative error of a distance in this type of number.
 pub(crate) fn rounding<N: Number>() -> N {
     N::of(if N::is_single() { SINGLE_ROUNDING } else { ROUNDING })
 }
 
-/// What happens to a point that met a surface.
+/// The response of a point that met a surface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum ContactMode {
     /// It leaves with e² of the energy of impact, or rests.
@@ -28,7 +28,7 @@ pub(crate) enum ContactMode {
     Spring,
 }
 
-/// Which side of what form.
+/// The form of a surface, and the side on which points are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Form {
     Plane,
@@ -36,7 +36,7 @@ pub(crate) enum Form {
     Outside,
 }
 
-/// What says how near a point is to a surface.
+/// The numbers that say how near a point is to a surface.
 pub(crate) struct Reach<'a> {
     pub form: Form,
     /// The normal, or the centre.
@@ -45,7 +45,7 @@ pub(crate) struct Reach<'a> {
     pub size: f64,
 }
 
-/// Where it is.
+/// The place of a surface.
 enum Location<N: Number> {
     Plane { normal: Vec<N>, offset: N },
     Sphere { is_inside: bool, centre: Vec<N>, radius: N },
