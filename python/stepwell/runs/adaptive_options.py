@@ -24,16 +24,6 @@ if TYPE_CHECKING:
     from .continuation import Continuation
 
 
-def check_adaptive(options: Options, before: Continuation | None) -> None:
-    """Raise if the run that goes on has fixed steps, or if ``tolerance`` or ``at`` is missing."""
-    if before is not None and not before.adaptive:
-        raise ArgumentError(
-            "resume: expected a run with adaptive steps, since tolerance= or at= was given, got one with fixed steps; start anew "
-            "from its last state: v=run.v[-1], y=run.y[-1], t0=run.t[-1]"
-        )
-    check_times(options.tolerance is not None or before is not None, options.at)
-
-
 def check_times(has_tolerance: bool, at: Any) -> None:
     """Raise if ``tolerance`` or ``at`` is missing."""
     if at is None:

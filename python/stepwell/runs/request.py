@@ -216,8 +216,13 @@ class Request(NamedTuple):
             continuation.changes_on(before, options.events)
         goes_with_a_controller(system, method, tolerance=True)
         because = "tolerance= or at= was given" if before is None else "the run that goes on has adaptive steps"
-        adaptive_options.check_adaptive(options, before)
+        if before is not None and not before.adaptive:
+            raise ArgumentError(
+                "resume: expected a run with adaptive steps, since tolerance= or at= was given, got one with fixed steps; start "
+                "anew from its last state: v=run.v[-1], y=run.y[-1], t0=run.t[-1]"
+            )
         asked = Checked(options._replace(v=v), f"and {because}", system=system, method=method, before=before)
+        adaptive_options.check_times(options.tolerance is not None or before is not None, options.at)
         control, single, y = asked["control"], asked["dtype"], asked["y"]
         adaptive_options.check_estimates(system, method, control, options, before)
         if single:
@@ -421,8 +426,6 @@ class Request(NamedTuple):
             options._replace(dt=1.0 if options.dt is None else options.dt), None, way="step", system=system, method=method
         )
         dt, t0, fused, single, control, form = (asked[name] for name in ("dt", "t0", "fused", "dtype", "control", "form"))
-        if dt < 0.0:
-            raise ArgumentError(f"dt: expected a number above zero in units of time, got {dt:g}")
         if form != "direct" and (fused or control is not None):
             raise UnsupportedError("form: form='matrix' goes without fused=, attempt= and control=")
         if form != "direct":

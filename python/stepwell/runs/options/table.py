@@ -36,7 +36,7 @@ def _dt(value: Any, asked: "Checked") -> Any:
     """The step; with a tolerance the one to try first, of all members or of each."""
     if asked.is_adaptive:
         return checks.numbers("dt", value, unit="units of time")
-    dt = checks.step(value)
+    dt = checks.number("dt", value, positive=True, unit="units of time") if asked.way == "step" else checks.step(value)
     if asked["dtype"]:
         from .. import float32  # only such runs need it
 
