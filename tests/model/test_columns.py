@@ -43,7 +43,7 @@ def made(system: Any, method: str, by: tuple[str, ...], v: Any, y: Any, **option
     """The run of the system with columns, its blocks and derivatives apart, and the system with columns."""
     batch = system.batch
     columns = Columns(system.for_state_shapes(v, y), by)
-    begin_v, begin_y = columns.beside(np.asarray(v, float), np.asarray(y, float), batch)
+    begin_v, begin_y = columns.beside(np.zeros(0) if v is None else np.asarray(v, float), np.asarray(y, float), batch)
     run = sw.integrate(columns, method, v=begin_v, y=begin_y, **options)
     return run, columns.apart(run.v, run.y), columns
 

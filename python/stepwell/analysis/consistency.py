@@ -13,7 +13,6 @@ from ..model.derivatives import traced
 from ..model.systems import System
 from ..model.systems.base import a_system
 from ..reference import pivoting
-from .stability import maps
 
 #: The most passes of Newton's method. Each doubles the number of right digits; a start far off may need some more.
 MOST_PASSES = 50
@@ -63,7 +62,7 @@ def consistent_start(system: System, y: Any, *, t0: Any = 0.0) -> Array:
     y = checks.block("y", y, system.y_shape, system.axes)
     t0 = checks.numbers("t0", t0, unit="units of time")
     members = traced.together(system, np.empty(0), y, t0=t0)
-    y = np.array(maps.spread(y, system.y_shape, members))
+    y = np.array(checks.spread(y, system.y_shape, members))
     for _ in range(MOST_PASSES):
         change = correction(system, y, t0)
         y += change

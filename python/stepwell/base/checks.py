@@ -344,6 +344,16 @@ def over(array: Array, shape: Shape) -> Array:
     return wide
 
 
+def spread(array: Array, block: Shape, batch: Shape) -> Array:
+    """A block of this shape, with batch axes behind it that broadcast, over the whole batch."""
+    axes = array.shape[len(block) :]
+    if axes == batch:
+        return array
+    if not array.ndim:
+        return over(array, batch)
+    return np.broadcast_to(array.reshape((*block, *(1,) * (len(batch) - len(axes)), *axes)), (*block, *batch))
+
+
 def concatenated(parts: Sequence[Array]) -> Array:
     """Arrays of shape (rows, *batch), joined along the rows; the batch axes broadcast."""
     axes = max(part.ndim for part in parts)

@@ -18,7 +18,6 @@ from ..reference.acceptance import Acceptance
 from . import continuation, engine
 from .options import Options
 from .result import AdaptiveState
-from .start import spread
 
 if TYPE_CHECKING:
     from .continuation import Continuation
@@ -76,9 +75,9 @@ def is_backward(times: Array, t0: Array) -> bool:
 def times_of_run(t0: Array, times: Array, batch: Shape) -> tuple[Array, Array]:
     """Times of the start and of saved states for the run: copies, broadcast to the batch if members have their own."""
     if t0.ndim:
-        t0 = spread(t0, (), batch)
+        t0 = checks.spread(t0, (), batch)
     if times.ndim > 1:
-        times = spread(times, times.shape[:1], batch)
+        times = checks.spread(times, times.shape[:1], batch)
     return t0.copy(), times.copy()
 
 

@@ -18,7 +18,6 @@ from .request import Request
 from .result import Run
 from .short import ShortRun
 from .short_runs import fixed_options, is_free, is_small, short_run_of_request
-from .start import spread
 
 if TYPE_CHECKING:
     from typing import Unpack
@@ -137,8 +136,8 @@ def _from(request: Request, shapes: tuple[Shape, Shape], v: Any, y: Any) -> Requ
     own = request.v.shape if shapes[0] == request.v.shape == (0, *batch) else np.shape(v)
     if (own, np.shape(y)) != shapes:
         return None
-    v = spread(checks.block("v", v, system.v_shape, system.axes), system.v_shape, batch)
-    y = spread(checks.block("y", y, system.y_shape, system.axes), system.y_shape, batch)
+    v = checks.spread(checks.block("v", v, system.v_shape, system.axes), system.v_shape, batch)
+    y = checks.spread(checks.block("y", y, system.y_shape, system.axes), system.y_shape, batch)
     control = request.step_control
     if control is not None:
         control = control._replace(start=(control.start[0], v, y))

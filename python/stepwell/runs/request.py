@@ -41,7 +41,6 @@ from .start import (
     controlled,
     last_time,
     options_of_resumed,
-    spread,
     under_control,
 )
 
@@ -158,7 +157,7 @@ class Request(NamedTuple):
         batch = checks.batch_shape(asked.batches())
         rows = prod(system.v_shape) + prod(system.y_shape)
         if isinstance(t0, np.ndarray):
-            t0 = spread(t0, (), batch)
+            t0 = checks.spread(t0, (), batch)
             rows += 1  # the times, which are each member's own
         plan = engine.Plan(system, method, batch, dt, t0, steps=steps, every=every, form=form, **of_plan)
         # In float32, in the matrix forms and with events quantities are computed from the saved states, which do not tell what a
@@ -178,7 +177,7 @@ class Request(NamedTuple):
                 checks.fits_single(name, block)
             if control is not None:  # whose target is that of the start as it is stepped
                 v, y = (np.asarray(block, np.float32).astype(np.float64) for block in (v, y))
-        v, y = spread(v, system.v_shape, batch), spread(y, system.y_shape, batch)
+        v, y = checks.spread(v, system.v_shape, batch), checks.spread(y, system.y_shape, batch)
         if control is not None:
             system = controlled(system, method, control, v, y, dt)
         if before is None:
@@ -190,12 +189,12 @@ class Request(NamedTuple):
         carried = False
         if before is not None and before.carry is not None and (carried := before.holds(system, batch, v, y)):
             of_slot = (plan.slot_numbers,) if method.kept else system.v_shape
-            v = spread(np.asarray(before.carry, np.float64), of_slot, batch)
+            v = checks.spread(np.asarray(before.carry, np.float64), of_slot, batch)
         bad = None if before is None else before.first_bad_step
         if bad is not None:
             bad = checks.diverged_before(bad, v, y, batch)
         if force is not None:
-            plan = plan._replace(force=spread(force, system.v_shape, batch))
+            plan = plan._replace(force=checks.spread(force, system.v_shape, batch))
         if record or stepped is not plan.system:
             plan = plan._replace(system=stepped, record=while_stepping)
         if stepped.controller is not None:
@@ -299,10 +298,10 @@ class Request(NamedTuple):
             )
         t0, times = adaptive_options.times_of_run(t0, times, batch)
         if jumps is not None and (t0.ndim or jumps.ndim > 1):  # bracketed by the times of each member
-            jumps = spread(jumps, jumps.shape[:1], batch)
+            jumps = checks.spread(jumps, jumps.shape[:1], batch)
         since = sign * t0 if pace is None else np.maximum(pace[engine.TARGET], sign * t0)
         adaptive_options.check_ascending(sign * times, since, sign, pace is not None)
-        v, y = spread(v, system.v_shape, batch), spread(y, system.y_shape, batch)
+        v, y = checks.spread(v, system.v_shape, batch), checks.spread(y, system.y_shape, batch)
         if single:
             v, y = float32.rounded_state(v, y)
             if tolerances is not None:
@@ -321,7 +320,7 @@ class Request(NamedTuple):
         begin: Any = sign * t0 if t0.ndim else float(sign * t0)
         plan = engine.Plan(
             system, method, batch, 1.0, begin, order=order, acceptance=acceptance, backward=backward,
-            force=None if force is None else spread(force, system.v_shape, batch), **of_plan,
+            force=None if force is None else checks.spread(force, system.v_shape, batch), **of_plan,
         )  # fmt: skip
         at = np.ascontiguousarray(sign * times)
         pacing = engine.Pacing(at, budget, pace is None, None if jumps is None else np.sort(sign * jumps, axis=0))
@@ -445,7 +444,7 @@ class Request(NamedTuple):
             if single:
                 checks.fits_single(name, block)
                 block = np.asarray(np.asarray(block, np.float32), np.float64)
-            blocks[name] = spread(block, shapes[name], batch)
+            blocks[name] = checks.spread(block, shapes[name], batch)
         v, y, force = (blocks.get(name) for name in shapes)
         if control is not None:
             system = under_control(system, control, v, y, batch, None if options.dt is None else dt)
@@ -457,8 +456,8 @@ class Request(NamedTuple):
             goes_with_a_controller(stepped, method)
             plan = plan._replace(memory=_memory(stepped, batch, None))
         first = np.arange(1.0, 1.0 + prod(system.y_shape)).reshape(system.y_shape)
-        v = spread(np.zeros(system.v_shape), system.v_shape, batch) if v is None else v
-        return cls(plan, system, v, spread(first, system.y_shape, batch) if y is None else y)
+        v = checks.spread(np.zeros(system.v_shape), system.v_shape, batch) if v is None else v
+        return cls(plan, system, v, checks.spread(first, system.y_shape, batch) if y is None else y)
 
 
 def _memory(system: System, batch: Shape, before: Continuation | None) -> Array:

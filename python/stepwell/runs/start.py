@@ -84,16 +84,6 @@ def block_like(block: Any, like: Array) -> Array:
     return array if array.shape == like.shape else checks.over(array, like.shape)
 
 
-def spread(array: Array, block: Shape, batch: Shape) -> Array:
-    """Broadcast a block to the whole batch."""
-    axes = array.shape[len(block) :]
-    if axes == batch:
-        return array
-    if not array.ndim:
-        return checks.over(array, batch)
-    return np.broadcast_to(array.reshape((*block, *(1,) * (len(batch) - len(axes)), *axes)), (*block, *batch))
-
-
 def last_time(t0: Any, dt: float, start_step: int, steps: int) -> float:
     """The largest |t| of a run; raise if a time does not advance or is not finite."""
     begin, end = t0 + start_step * dt, t0 + (start_step + steps) * dt

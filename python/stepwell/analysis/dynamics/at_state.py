@@ -141,7 +141,7 @@ def rates_at(system: System, v: Array, y: Array, t: Any = 0.0) -> Array:
     members = traced.together(system, v, y, t=t)
     if _is_traced(system):
         return traced.rates(system, members, v, y, t)
-    v, y = (maps.spread(block, shape, members) for block, shape in ((v, system.v_shape), (y, system.y_shape)))
+    v, y = (checks.spread(block, shape, members) for block, shape in ((v, system.v_shape), (y, system.y_shape)))
     with np.errstate(all="ignore"):
         s = system.scaled(1.0, members)
         return np.concatenate([s.dv(t, v, y).reshape(-1, *members), s.dy(t, v, y).reshape(-1, *members)])

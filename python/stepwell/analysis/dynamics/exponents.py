@@ -228,7 +228,7 @@ def averages(
     _not_too_long(system, method, members, dt)
     noted = -(-steps // every) if keep_history else 1
     checks.fits("the exponents over time", noted * k + 6 * n * (k + 1), members, "take fewer steps, or a larger every=")
-    v, y = maps.spread(v, system.v_shape, members), maps.spread(y, system.y_shape, members)
+    v, y = checks.spread(v, system.v_shape, members), checks.spread(y, system.y_shape, members)
     tapes, count = _Tapes(system, method, k), prod(members)
     motions = _motions(tapes, engine.Plan(system, method, members, dt, t0), v, y, tapes.shares(count, every, threads))
     history = np.empty((noted, k, count))
@@ -293,7 +293,7 @@ def adaptive_averages(
     count = prod(members)
     per_member = [_of_members(each, members) for each in of_steps]
     both = ((v, system.v_shape), (y, system.y_shape))
-    states = np.concatenate([maps.spread(block, shape, members).reshape(prod(shape), count) for block, shape in both])
+    states = np.concatenate([checks.spread(block, shape, members).reshape(prod(shape), count) for block, shape in both])
     vectors = np.array(np.broadcast_to(_orthonormal(_generic(n, k))[0][:, :, np.newaxis], (n, k, count)))
     whole = Members(engine.Plan(Variational(system, k), method, members, 1.0))
     going, left = np.arange(count), whole.plan(np.arange(count)).system

@@ -207,7 +207,7 @@ def _linear_part(system: System, method: Method, v: Array, y: Array, t: float, m
 def _is_at_rest(system: System, matrix: Array, rates: Array, v: Array, y: Array) -> bool:
     """True if the rates of all members are no more than the rounding of their terms."""
     members = rates.shape[1:]
-    blocks = (maps.spread(block, shape, members) for block, shape in ((v, system.v_shape), (y, system.y_shape)))
+    blocks = (checks.spread(block, shape, members) for block, shape in ((v, system.v_shape), (y, system.y_shape)))
     numbers = np.concatenate([block.reshape(-1, *members) for block in blocks])
     rounding = RESTS * np.einsum("ij...,j...->i...", np.abs(matrix), np.abs(numbers))
     return bool((np.abs(rates) <= rounding).all())

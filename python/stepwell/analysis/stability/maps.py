@@ -132,14 +132,8 @@ def finish(
 
 def _started(system: System, method: Method, dt: Array, members: Shape, t: float, v: Array, y: Array) -> Array:
     """The slot that a method carries in place of v, where each member may have its own step."""
-    v, y = spread(v, system.v_shape, members), spread(y, system.y_shape, members)
+    v, y = checks.spread(v, system.v_shape, members), checks.spread(y, system.y_shape, members)
     return method.steps.start(_scaled(system, dt, members), 0, t, v, y)
-
-
-def spread(block: Array, shape: Shape, members: Shape) -> Array:
-    """A block, of this shape for each member, over all members."""
-    own = block.shape[len(shape) :]
-    return np.broadcast_to(block.reshape((*shape, *(1,) * (len(members) - len(own)), *own)), (*shape, *members))
 
 
 def unit(system: System, members: Shape) -> tuple[Array, Array]:

@@ -6,13 +6,13 @@ from functools import partial
 from math import prod
 from typing import Any
 
+from ...base import checks
 from ...base.arrays import Array, Shape
 from ...base.immutable import changed, complete
 from ...model.methods import Method
 from ...model.systems import System
 from ...runs import engine
 from ...runs.events.members import Members
-from . import maps
 
 
 class Batch:
@@ -25,7 +25,7 @@ class Batch:
         self._blocks: list[Array] | None = None
         if v is not None and y is not None:
             both, count = ((v, system.v_shape), (y, system.y_shape)), prod(members)
-            self._blocks = [maps.spread(block, shape, members).reshape((*shape, count)) for block, shape in both]
+            self._blocks = [checks.spread(block, shape, members).reshape((*shape, count)) for block, shape in both]
 
     def of(self, index: Any) -> tuple[System, Array | None, Array | None]:
         """The system and the state of the members with these indices."""

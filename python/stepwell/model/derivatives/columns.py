@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from ... import _core
+from ...base import checks
 from ...base.arrays import Array, Shape
 from ...errors import UnsupportedError
 from ...reference.tape.evaluate import Evaluation
@@ -140,7 +141,7 @@ class Columns(System):
             (v, self.of.v_shape, begin[: self.numbers[0]]),
             (y, self.of.y_shape, begin[self.numbers[0] :]),
         ):
-            alone = np.broadcast_to(block, (*shape, *batch)).reshape(prod(shape), *batch)
+            alone = checks.spread(block, shape, batch).reshape(prod(shape), *batch)
             columns = np.broadcast_to(rows.reshape(-1, *len(batch) * (1,)), (rows.size, *batch))
             both.append(np.concatenate([alone, columns]))
         return both[0], both[1]

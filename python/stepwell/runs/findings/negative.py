@@ -29,8 +29,10 @@ from . import Case, may_have_amounts
 BEYOND, PART = 100.0, 0.01
 #: Less than this part of the largest size so far, a molecule of a mole, is nothing.
 NOTHING = 2.0**-80
-#: Rates are looked at in so many states, whose numbers are from the first to the second of these parts of the largest one.
-LOOKED_AT, LEAST_PART, MOST_PART = 64, 1e-4, 1e4
+#: Rates are evaluated in this many states, of which the first few show most equations that reach negative numbers.
+FEW, PLACES = 2, 64
+#: Their numbers are from the first to the second of these parts of the largest one.
+LEAST_PART, MOST_PART = 1e-4, 1e4
 #: The golden section.
 GOLDEN = (math.sqrt(5.0) - 1.0) / 2.0
 #: Members are looked at so many at a time.
@@ -78,9 +80,10 @@ def negative(system: System, method: Method, ends: tuple[Array, Array], t: Any, 
     members = np.flatnonzero(beyond.any(axis=0) & (first >= 0.0).all(axis=0))
     times = np.broadcast_to(t, batch).reshape(-1)
     plan = engine.Plan(system, method, batch, 1.0)
-    some = [members[i : i + AT_ONCE] for i in range(0, members.size, AT_ONCE)]
-    stay = [_stay_positive(plan, each, times[each], last[:, each]) for each in some]
-    members = members[np.concatenate([*stay, np.empty(0, bool)])]
+    for begin, end_of_places in ((0, FEW), (FEW, PLACES)):
+        some = [members[i : i + AT_ONCE] for i in range(0, members.size, AT_ONCE)]
+        stay = [_stay_positive(plan, each, times[each], last[:, each], begin, end_of_places) for each in some]
+        members = members[np.concatenate([*stay, np.empty(0, bool)])]
     if not members.size:
         return None
     one = int(members[0])
@@ -105,14 +108,17 @@ def _allowed(plan: engine.Plan, pace: Array) -> Array:
     return np.asarray(allowed).reshape(count, plan.members)[list(plan.acceptance.groups)]
 
 
-def _stay_positive(plan: engine.Plan, members: Whole, t: Array, y: Array) -> Any:
-    """Of which members no rate of a number that is 0 is negative in states of positive numbers, far smaller and far larger."""
+def _stay_positive(plan: engine.Plan, members: Whole, t: Array, y: Array, begin: int, end: int) -> Any:
+    """Of which members no rate of a number that is 0 is negative in states of positive numbers, far smaller and far larger.
+
+    The states are those from number ``begin`` to ``end`` of all that are drawn.
+    """
     n, count = y.shape
-    places = np.arange(1.0, 1.0 + n * LOOKED_AT).reshape(n, LOOKED_AT)
+    places = np.arange(1.0, 1.0 + n * PLACES).reshape(n, PLACES)[:, begin:end]
     # Squares times an irrational number are spread evenly (Weyl); numpy.random takes some 20 ms to import.
     parts = LEAST_PART * (MOST_PART / LEAST_PART) ** (places * places * GOLDEN % 1.0)
-    states, looks = np.repeat(parts, n, axis=1), np.arange(n * LOOKED_AT)
-    zero = np.tile(np.arange(n), LOOKED_AT)
+    states, looks = np.repeat(parts, n, axis=1), np.arange(n * (end - begin))
+    zero = np.tile(np.arange(n), end - begin)
     states[zero, looks] = 0.0
     several = Members(plan._replace(progress=None)).plan(np.repeat(members, looks.size))
     unit: Any = engine.attempted_system(several).unit

@@ -30,7 +30,6 @@ from ...runs.findings.strong_control import of_a_strong_control
 from ...runs.options import OPTIONS, Options
 from ...runs.request import Request
 from ...runs.result import Run
-from ...runs.start import spread
 from .adaptive import NUMBERS_OF_A_CONTROLLER, Pieces, lost, numbers_of_waypoints
 from .axes import OF_THE_RUN
 from .exponents import Exponents
@@ -230,7 +229,7 @@ def _alone(task: Task, options: dict[str, Any], last: Run, pieces: Pieces) -> tu
         return None, None, None  # events may change states, so these say nothing about the steps
     system, batch = last.system, last.status.shape
     blocks = (("v", velocities(system, options.get("v")), system.v_shape), ("y", options["y"], system.y_shape))
-    v, y = (spread(checks.block(name, block, shape, system.axes), shape, batch) for name, block, shape in blocks)
+    v, y = (checks.spread(checks.block(name, block, shape, system.axes), shape, batch) for name, block, shape in blocks)
     if task.at is not None:
         return None, of_a_run(last, y, pieces.plan), None
     steps = task.transient + task.steps
