@@ -254,6 +254,21 @@ def test_with_a_tolerance_a_member_has_the_same_alone_and_a_driven_pendulum_shri
     np.testing.assert_array_equal(alone.history, each.history[:, :, 1])
 
 
+def test_with_a_tolerance_disturbances_count_where_the_motion_rests() -> None:
+    """Steps of the motion alone would be held at the limit of stability by then, where disturbances do not decay.
+
+    Near the equilibrium of ρ = 10 all decay as by its Jacobian; those of the pair of complex rates share the larger exponents.
+    """
+    lorenz = sw.system(order=1)(lambda t, y: [10 * (y[1] - y[0]), y[0] * (10 - y[2]) - y[1], y[0] * y[1] - 8 / 3 * y[2]])()
+    c = np.sqrt(24.0)
+    rates = np.linalg.eigvals(sw.jacobian(lorenz, y=np.array([c, c, 9.0])).matrix).real
+    at = {"at": np.arange(0.5, 100.1, 0.5), "transient": 120}
+    spectrum = sw.lyapunov(lorenz, "tsit5", y=np.array([1.0, 2.0, 3.0]), tolerance=1e-6, exponents="all", **at)
+    # Over 40 units of time ln 2 of how vectors of a pair lie; and a millionth a step of some fifty a unit of time.
+    np.testing.assert_allclose(spectrum.exponents[:2], np.sort(rates)[1:], rtol=0, atol=np.log(2.0) / 40.0)
+    assert spectrum.exponents[2] == pytest.approx(np.min(rates), abs=50 * 1e-6)
+
+
 def test_with_a_tolerance_a_member_that_stops_has_none() -> None:
     """ẏ = r·y² is infinite at t = 1/(r·y), and its disturbances grow as 2·r·y until then; for r < 0 they shrink."""
 

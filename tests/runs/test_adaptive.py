@@ -10,7 +10,7 @@ import stepwell as sw
 from stepwell import _core
 from stepwell.errors import ArgumentError, ShapeError, TooLargeError, UnsupportedError
 from stepwell.reference import series_pace
-from stepwell.reference.acceptance import Acceptance
+from stepwell.reference.acceptance import NO_GROUP, Acceptance
 from stepwell.reference.traced import Tracer
 from stepwell.runs import accepted_steps, engine
 from stepwell.runs.result import Status
@@ -730,6 +730,7 @@ def test_backward_for_built_in_and_large_systems() -> None:
 
 ACCEPTANCES = [Acceptance(), Acceptance((0, 1, 2, 3, 4, 5)), Acceptance((0, 0, 1, 2, 3, 3), own=True)]
 ACCEPTANCES += [Acceptance((0, 0, 0, 1, 1, 2), positive=(1, 5)), Acceptance(own=True, positive=(0,))]
+ACCEPTANCES += [Acceptance((0, NO_GROUP, 0, 1, NO_GROUP, 2), own=True), Acceptance((*3 * (NO_GROUP,), 0, 0, 0))]
 
 
 def test_attempts_are_one_graph() -> None:

@@ -196,7 +196,7 @@ impl ModelSpec {
         fused: bool,
         order: u32,
         single: bool,
-        acceptance: Option<(Vec<u32>, bool, Vec<u32>, bool)>,
+        acceptance: Option<(Vec<i64>, bool, Vec<u32>, bool)>,
         backward: bool,
     ) -> Self {
         let mut names = Signature { system, ..Signature::default() };
@@ -229,7 +229,7 @@ impl ModelSpec {
             (Some((nodes, _)), _) => StepKind::Matrix { nodes: nodes.into_iter().map(f64::to_bits).collect(), fused },
         };
         let acceptance = acceptance.map_or_else(Acceptance::default, |(groups, own, positive, compensated)| Acceptance {
-            groups,
+            groups: groups.into_iter().map(|group| u32::try_from(group).ok()).collect(),
             own,
             positive,
             compensated,

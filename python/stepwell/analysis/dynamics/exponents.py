@@ -143,7 +143,7 @@ def lyapunov(
 
     With ``tolerance`` and ``at`` in place of ``dt`` and ``steps`` the variational equations are integrated together with the
     motion, in adaptive steps, each member with its own. The states agree with those of ``integrate`` to this tolerance, not to
-    the bit.
+    the bit: errors of disturbances count, too, as steps that are good for a motion at rest are far too long for them.
 
     Args:
         system: the system; parameters may be arrays.

@@ -15,6 +15,7 @@ from ...model.inputs import Input
 from ...model.parameters import CoreParameters, flat
 from ...model.systems import System
 from ...model.systems.own import RATES
+from ...reference.acceptance import NO_GROUP, Acceptance
 from ...reference.tape.evaluate import Evaluation
 from ...reference.traced import Tracer
 from ..stability import maps
@@ -48,19 +49,23 @@ class Variational(System):
 
     A disturbance is a vector like (v, y). The first numbers of all disturbances come first, then the second, and so on. The rate
     of a disturbance is the derivative of the system's rates along it. The method must treat both blocks alike.
+
+    With a tolerance the errors of disturbances count as those of y if they are ``judged``. Else the steps are those of the system
+    alone, to the bit; but to rounding for a ``second_order`` one by Rosenbrock's methods, which solve smaller equations for it.
+    Disturbances are then the derivative of these steps, which may be far too long for them where the motion rests.
     """
 
     kernel = "equations"
     reference = _Rates
     second_order = False
 
-    def __init__(self, system: System, disturbances: int) -> None:
+    def __init__(self, system: System, disturbances: int, *, judged: bool = True) -> None:
         if system.keeper is not None or system.around:
             raise UnsupportedError(
                 f"tolerance: Lyapunov exponents of a system with a control, a surface or friction need fixed steps, got "
                 f"{system!r}; give dt= and steps="
             )
-        self.of, self.disturbances = system, disturbances
+        self.of, self.disturbances, self.judged = system, disturbances, judged
         n_v, n_y = maps.size(system)
         self.v_shape, self.y_shape = (n_v,), (n_y + (n_v + n_y) * disturbances,)
         self.batch = system.batch
@@ -74,6 +79,14 @@ class Variational(System):
         self._tape, self._rates = traced.tape, traced.along(disturbances)
         functions = derivatives_of_functions(traced.tape, traced.marks)
         self._core = traced.tape.equations(self._rates[:n_v], self._rates[n_v:], [], None, functions)
+
+    @property
+    def groups(self) -> tuple[int, ...]:
+        """The two blocks; or those of the system, and none for disturbances that are not judged."""
+        if self.judged:
+            return ()
+        n_v, n_y = maps.size(self.of)
+        return Acceptance(self.of.groups).of_numbers(n_v, n_y) + (NO_GROUP,) * ((n_v + n_y) * self.disturbances)
 
     def repr_arguments(self) -> list[str]:
         """The system, and the number of disturbances."""

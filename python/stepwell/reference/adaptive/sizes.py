@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from ...base.arrays import Array
+from ..acceptance import NO_GROUP
 from ..bits import and_bits, less, where
 
 
@@ -50,7 +51,8 @@ def sizes(v: Array, y: Array, block_axes: tuple[int, int], groups: tuple[int, ..
     rows = [row for block, axes in zip((v, y), block_axes, strict=True) for row in rows_of(block, axes)]
     members: dict[int, list[Any]] = {}
     for group, row in zip(groups, rows, strict=True):
-        members.setdefault(group, []).append(row)
+        if group != NO_GROUP:
+            members.setdefault(group, []).append(row)
     return stacked([length_of(members[group]) for group in sorted(members)])
 
 

@@ -247,8 +247,8 @@ def _sizes(run: Run, numbers: Array) -> State:
     """Spread one number for each group of components over the numbers of v and y."""
     shapes = run.system.v_shape, run.system.y_shape
     n_v, n_y = (prod(shape) for shape in shapes)
-    groups = run.system.groups or (0,) * n_v + (int(n_v > 0),) * n_y
-    rows = numbers[list(groups)]
+    groups = Acceptance(run.system.groups).of_numbers(n_v, n_y)
+    rows = np.concatenate([numbers, np.zeros_like(numbers[:1])])[list(groups)]  # the last is that of no group
     v, y = (part.reshape((*shape, *part.shape[1:])) for part, shape in zip((rows[:n_v], rows[n_v:]), shapes, strict=True))
     return v, y
 

@@ -105,7 +105,8 @@ def _allowed(plan: engine.Plan, pace: Array) -> Array:
     _, tolerated = adaptive.tolerated(numbers, numbers.h, (0, count), zero, zero, adaptive.ROUNDING)
     tolerated = np.maximum(np.maximum(tolerated, adaptive.rounded(numbers, numbers.h)), NOTHING * numbers.longest)
     allowed = np.maximum(tolerated, np.minimum(BEYOND * tolerated, PART * numbers.longest))
-    return np.asarray(allowed).reshape(count, plan.members)[list(plan.acceptance.groups)]
+    of_none = np.full((1, plan.members), np.inf)  # the last: numbers of no group may be negative
+    return np.concatenate([np.asarray(allowed).reshape(count, plan.members), of_none])[list(plan.acceptance.groups)]
 
 
 def _stay_positive(plan: engine.Plan, members: Whole, t: Array, y: Array, begin: int, end: int) -> Any:

@@ -26,6 +26,7 @@ from ...model.methods import Method, for_stiff
 from ...model.methods import method as find_method
 from ...model.systems import LinearSystem
 from ...reference import adaptive
+from ...reference.acceptance import NO_GROUP
 from .. import engine
 from ..events.attempts import attempted
 from ..events.members import Members
@@ -196,20 +197,22 @@ def suspects(plan: engine.Plan, waypoints: Array) -> list[int]:
     several, those that are left by one number.
     """
     n_v, n_y = prod(plan.system.v_shape), prod(plan.system.y_shape)
-    groups, of_v = _places(plan.acceptance.groups, n_v, n_y), plan.acceptance.counts(n_v, n_y)[0]
+    groups, of_v = _places(plan.acceptance.of_numbers(n_v, n_y)), plan.acceptance.counts(n_v, n_y)[0]
     exponent = 1.0 / (plan.order or plan.method.error_order or plan.method.order)
     # What v makes of y within its rounding counts as nothing.
     lost = 0.0 if of_v in (0, len(groups)) else _rounding(plan)
     members: Any = range(plan.members) if plan.members < SEVERAL else _by_the_last_group(plan, waypoints, groups, exponent)
     own = plan.acceptance.own
     return [
-        k for k in members if all(_hardly_moves(row, groups, of_v, own, exponent, lost) for row in waypoints[..., k].tolist())
+        k
+        for k in members
+        if all(_hardly_moves(row, n_v + n_y, groups, of_v, own, exponent, lost) for row in waypoints[..., k].tolist())
     ]
 
 
 def _by_the_last_group(plan: engine.Plan, waypoints: Array, groups: list[list[int]], exponent: float) -> Any:
     """The members of which a number of the last group hardly moved, as ``_hardly_moves`` has it."""
-    n, count = sum(map(len, groups)), len(groups)
+    n, count = prod(plan.system.v_shape) + prod(plan.system.y_shape), len(groups)
     place, size = groups[-1][0], waypoints[:, 2 * n + engine.PACE_NUMBERS + count - 1]
     own = 2 * n + engine.PACE_NUMBERS + engine.SCALES * count
     rows = (own + count - 1, own + 2 * count - 1) if plan.acceptance.own else (2 * n + engine.RELATIVE, 2 * n + engine.ABSOLUTE)
@@ -221,19 +224,19 @@ def _by_the_last_group(plan: engine.Plan, waypoints: Array, groups: list[list[in
 
 
 @cache
-def _places(groups: tuple[int, ...], n_v: int, n_y: int) -> list[list[int]]:
+def _places(groups: tuple[int, ...]) -> list[list[int]]:
     """The places of the numbers of each group among those of v and y."""
-    n = n_v + n_y
-    groups = groups or tuple(int(0 < n_v <= i) for i in range(n))
-    return [[i for i in range(n) if groups[i] == group] for group in sorted(set(groups))]
+    return [[i for i, own in enumerate(groups) if own == group] for group in sorted(set(groups) - {NO_GROUP})]
 
 
-def _hardly_moves(row: list[float], groups: list[list[int]], of_v: int, has_own: bool, exponent: float, lost: float) -> bool:
+def _hardly_moves(
+    row: list[float], n: int, groups: list[list[int]], of_v: int, has_own: bool, exponent: float, lost: float
+) -> bool:
     """True if the step to a waypoint moved a member as little as one that stability holds down.
 
-    The largest sizes so far stand for the present ones, which allows rather more than is tolerated.
+    The largest sizes so far stand for the present ones, which allows rather more than is tolerated. A state has ``n`` numbers.
     """
-    n, count = sum(map(len, groups)), len(groups)
+    count = len(groups)
     first = 2 * n + engine.PACE_NUMBERS
     own = first + engine.SCALES * count
     if not row[2 * n + engine.COUNTS.start] > 0.0:

@@ -12,7 +12,7 @@ from ...base.arrays import Array, Shape
 from ...errors import DTypeError, ShapeError, UnsupportedError
 from ...model.methods import Method
 from ...model.systems import System
-from ...reference.acceptance import Acceptance
+from ...reference.acceptance import NO_GROUP, Acceptance
 from .. import engine
 
 
@@ -59,7 +59,7 @@ def _is_of_components(part: Array, system: System, batch: Shape) -> bool:
 def _of_groups(part: Array, of_components: bool, system: System, acceptance: Acceptance) -> Array:
     """A tolerance for each group of components: the least of its components."""
     n_v, n_y = prod(system.v_shape), prod(system.y_shape)
-    groups = acceptance.groups or (0,) * n_v + (int(n_v > 0),) * n_y
+    groups = acceptance.of_numbers(n_v, n_y)
     count = sum(acceptance.counts(n_v, n_y))
     if not of_components:
         return np.broadcast_to(part, (count, *part.shape)) if part.ndim else checks.over(part, (count,))
@@ -73,7 +73,8 @@ def _of_groups(part: Array, of_components: bool, system: System, acceptance: Acc
         return of_each  # each component is a group
     least = np.full((count, *rows.shape[1:]), np.inf)
     for group, row in zip(groups, of_each, strict=True):
-        least[group] = np.minimum(least[group], row)
+        if group != NO_GROUP:
+            least[group] = np.minimum(least[group], row)
     return least
 
 

@@ -7,8 +7,9 @@ use crate::tape::number::Number;
 #[derive(Clone, Debug, Default, PartialEq, Eq, Hash)]
 pub struct Acceptance {
     /// For each number of v, then of y, the group to which it belongs, counted from 0 without gaps, those of v first. The error
-    /// of a group is the length of its numbers. Empty if v is one group and y is another.
-    pub groups: Vec<u32>,
+    /// of a group is the length of its numbers. Numbers of none are carried along: steps do not depend on them. Empty if v is
+    /// one group and y is another.
+    pub groups: Vec<Option<u32>>,
     /// Whether each group has tolerances of its own.
     pub own: bool,
     /// Numbers of v, then of y, by their places, that must not become negative.
@@ -23,7 +24,7 @@ impl Acceptance {
         if self.groups.is_empty() {
             return [v, y].map(|numbers| usize::from(numbers > 0));
         }
-        let counted = |groups: &[u32]| groups.iter().max().map_or(0, |last| *last as usize + 1);
+        let counted = |groups: &[Option<u32>]| groups.iter().flatten().max().map_or(0, |last| *last as usize + 1);
         let of_v = counted(self.groups.get(..v).unwrap_or_default());
         [of_v, counted(&self.groups) - of_v]
     }
@@ -42,7 +43,9 @@ impl Acceptance {
         let [of_v, of_y] = self.counts(v.len(), y.len());
         let mut members = vec![Vec::new(); of_v + of_y];
         for (group, number) in self.groups.iter().zip(v.iter().chain(y)) {
-            members[*group as usize].push(number);
+            if let Some(group) = group {
+                members[*group as usize].push(number);
+            }
         }
         members.into_iter().map(|numbers| length(numbers.into_iter())).collect()
     }
