@@ -140,7 +140,6 @@ def solve_ivp(
         ``message`` and ``success``.
 
     Raises:
-        ArgumentError: if an argument is wrong.
         TraceError: if an operation of ``fun`` cannot be traced.
         UnknownNameError: if there is no such method; for a method of SciPy that stepwell lacks, it says what to write.
 

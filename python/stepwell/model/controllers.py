@@ -346,11 +346,7 @@ class Controller(Part):
         return s
 
     def over_steps(self, dt: float) -> Controller:
-        """This controller with its period and its delay in steps of this length.
-
-        Raises:
-            ArgumentError: if they are no whole numbers of steps.
-        """
+        """This controller with its period and its delay in steps of this length."""
         steps, late = _whole("period", self.period, abs(dt)), _whole("delay", self.delay, abs(dt))
         if steps < 1:
             raise ArgumentError(f"period: expected a step of at most {self.period:g}, got dt = {dt:g}")
@@ -597,11 +593,7 @@ class Controllers(Controller):
         return changed(self, each=tuple(each.member(one) for each in self.each))
 
     def over_steps(self, dt: float) -> Controller:
-        """Return these controllers with their times in steps of this length; within, those of each in samples of the whole.
-
-        Raises:
-            ArgumentError: if they are no whole numbers of steps.
-        """
+        """Return these controllers with their times in steps of this length; within, those of each in samples of the whole."""
         each = [one.over_steps(dt) for one in self.each]
         tick = gcd(*(steps for one in each for steps in (one._timing().steps, one._timing().later)))
         inner = (Timing(one._timing().steps // tick, one._timing().waiting, one._timing().later // tick) for one in each)
@@ -653,11 +645,7 @@ class Controllers(Controller):
 
 
 def _output_rows(system: System) -> Array:
-    """The rows of C of a linear system whose outputs a controller reads.
-
-    Raises:
-        UnsupportedError: if it has none, or they are not functions of the state alone that all members have in common.
-    """
+    """The rows of C of a linear system whose outputs a controller reads."""
     C, D = (getattr(system, name, None) for name in "CD") if system.kernel == "linear" else (None, None)
     if C is None:
         raise UnsupportedError(
@@ -700,11 +688,7 @@ def _whole(name: str, time: float, dt: float) -> int:
 
 
 def target(system: System, name: str) -> Target:
-    """The parameter of a system that a controller sets.
-
-    Raises:
-        ArgumentError: if there is none of that name, or its numbers do not reach the step as they are.
-    """
+    """The parameter of a system that a controller sets."""
     inputs, parameters = system.given_inputs(), system.arguments()
     direct = {each: row for each, (row, least) in system.direct().items() if least == checks.ANY}
     if name in inputs:

@@ -67,9 +67,6 @@ class Scene(ValueEquality):
     Two scenes are equal if all of these are. A scene can be pickled and copied if its ``exact`` can: those of the built-in scenes
     can, a lambda cannot.
 
-    Raises:
-        ArgumentError: what was given and what was expected.
-
     Example:
         >>> scene = Scene(sw.Pendulum(), v=0.0, y=2.0, horizon=20.0)
         >>> sw.advise(scene, frame=None, tolerance=1e-3, methods=["leapfrog", "rk4"], cost="evaluations")
@@ -153,7 +150,6 @@ class Scene(ValueEquality):
             A ``Run`` with blocks of shape (saved, *block).
 
         Raises:
-            ArgumentError: what was given and what was expected.
             UnsupportedError: if the method cannot step the system.
 
         Warns:
@@ -192,7 +188,6 @@ class Scene(ValueEquality):
             The page, an ``Explorer``, which can also be saved; see ``stepwell.explore``.
 
         Raises:
-            ArgumentError: what was given and what was expected.
             UnsupportedError: if no method steps the scene, or its steps are too long for a page.
         """
         show = checks.flag("show", show)

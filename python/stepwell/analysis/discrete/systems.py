@@ -303,7 +303,6 @@ def discretise(
         A ``DiscreteSystem``.
 
     Raises:
-        ArgumentError: if an argument is wrong.
         UnsupportedError: if the system is not linear, or the method cannot step it.
 
     Example:

@@ -109,7 +109,6 @@ def jacobian(system: System, *, y: Any, v: Any = None, t: float = 0.0) -> Jacobi
         A ``Jacobian``: ``matrix`` of shape (n, n, *members), and its blocks ``vv``, ``vy``, ``yv`` and ``yy``.
 
     Raises:
-        ArgumentError: what was given and what was expected.
         UnsupportedError: if the rates depend on the state through an operation that has no derivative.
 
     Example:

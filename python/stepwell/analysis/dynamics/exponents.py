@@ -167,7 +167,6 @@ def lyapunov(
         ``Lyapunov``: ``exponents`` of shape (k, *batch), and their history.
 
     Raises:
-        ArgumentError: what was given and what was expected.
         UnsupportedError: if the method cannot step the system, a step has no derivative, or its derivative is too long.
 
     Warns:

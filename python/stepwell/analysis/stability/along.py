@@ -125,7 +125,6 @@ def stability_along(run: Run, method: str | Method | None = None) -> StabilityAl
         A ``StabilityAlong``: ``dt``, ``index``, ``when`` and ``mode``, and ``limits`` of every state.
 
     Raises:
-        ArgumentError: what was given and what was expected.
         UnsupportedError: if the method cannot do the system, or its rates have no derivative.
 
     Example:

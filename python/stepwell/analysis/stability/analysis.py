@@ -258,7 +258,6 @@ def analyse(
         An ``Analysis``; numbers for one member, arrays of the shape of the members otherwise.
 
     Raises:
-        ArgumentError: what was given and what was expected.
         UnsupportedError: if the method cannot step the system.
 
     Example:

@@ -76,7 +76,6 @@ def stability_limit(system: System, method: str | Method, *, at: Any = None, t: 
         derivatives of the rates are not finite.
 
     Raises:
-        ArgumentError: what was given and what was expected.
         UnsupportedError: if the method cannot step the system, or a nonlinear system comes without a state.
 
     Warns:

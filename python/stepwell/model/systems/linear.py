@@ -51,9 +51,6 @@ class LinearSystem(System):
         second_order: whether ẏ is v times a number, so that Verlet can step it if no row of v depends on v.
         input_names: ``("x",)`` for one input, ``("x[0]", "x[1]", …)`` for several.
 
-    Raises:
-        ArgumentError: if an argument is wrong.
-
     Example:
         >>> mass = sw.LinearSystem([[-0.2, -4.0], [1.0, 0.0]], B=[1.0, 0.0], x=1.0)  # states: velocity, position
         >>> run = sw.integrate(mass, "rk4", v=0.0, y=0.0, dt=0.05, steps=2000)
@@ -312,11 +309,7 @@ class LinearSystem(System):
 
 
 def realised(system: LinearSystem, argument: str = "system", *, of_states: bool = False) -> Realisation:
-    """The matrices of a system, with zeros for D; without C, if that is allowed, the outputs are the states.
-
-    Raises:
-        ArgumentError: if it has no inputs or no outputs.
-    """
+    """The matrices of a system, with zeros for D; without C, if that is allowed, the outputs are the states."""
     from .realisation import Realisation
 
     system.not_in_a_loop(argument)
@@ -330,11 +323,7 @@ def realised(system: LinearSystem, argument: str = "system", *, of_states: bool 
 
 
 def joined(part: Realisation, arguments: str = "system") -> LinearSystem:
-    """The system with these matrices.
-
-    Raises:
-        ArgumentError: if it has no states.
-    """
+    """The system with these matrices."""
     if not part.size:
         raise ArgumentError(f"{arguments}: expected at least one linear system, got gains alone, which have no states")
     D = part.D if part.D.any() else None
@@ -347,12 +336,7 @@ def is_gain(value: Any) -> bool:
 
 
 def part_of(argument: str, system: Any, *, of_states: bool = False) -> Realisation:
-    """The matrices of a linear system of stepwell, SciPy or python-control.
-
-    Raises:
-        ArgumentError: if it is none.
-        UnsupportedError: if it is sampled already, or not linear.
-    """
+    """The matrices of a linear system of stepwell, SciPy or python-control."""
     if isinstance(system, LinearSystem):
         return realised(system, argument, of_states=of_states)
     if isinstance(system, System):

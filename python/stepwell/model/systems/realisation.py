@@ -118,12 +118,7 @@ _GAIN = "a gain alone has no state to step; multiply another system by the numbe
 
 
 def of_object(argument: str, value: Any) -> Realisation:
-    """The matrices of an object of SciPy or python-control.
-
-    Raises:
-        DTypeError: if it has neither matrices, nor polynomials, nor zeros and poles.
-        UnsupportedError: if it is a system of samples.
-    """
+    """The matrices of an object of SciPy or python-control."""
     step = getattr(value, "dt", None)
     if step is not None and (isinstance(step, bool) or step != 0):
         raise UnsupportedError(

@@ -67,10 +67,6 @@ def surfaces_for_rods(floor: Any, dims: set[int]) -> tuple[tuple[surfaces.Surfac
     Args:
         floor: the argument.
         dims: the dimension of the rods, likewise.
-
-    Raises:
-        ShapeError: if a surface has another dimension.
-        UnsupportedError: for a way other than "safe".
     """
     floors, dims = surfaces.floors(floor), set(dims)
     for i, each in enumerate(floors):

@@ -79,7 +79,6 @@ def explain(
         An ``Explanation``.
 
     Raises:
-        ArgumentError: what was given and what was expected.
         UnsupportedError: if the method cannot step the system.
 
     Example:

@@ -99,11 +99,7 @@ def camel(name: str) -> str:
 
 
 def prefix(name: object) -> str:
-    """Return the argument ``name`` if functions and types can have that name.
-
-    Raises:
-        ArgumentError: what was given and what was expected.
-    """
+    """Return the argument ``name`` if functions and types can have that name."""
     if not isinstance(name, str):
         raise DTypeError(f"name: expected a word, got {checks.short(name)} ({type(name).__name__})")
     if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", name, re.ASCII) or len(name) > MAX_PREFIX:

@@ -116,9 +116,6 @@ def motion_of(scene: Scene, frame: float | None, tolerance: float, single: bool 
     """The true motion of a scene, over whole frames; with ``single`` a little further, where it is known.
 
     Runs of float32 make steps that are rounded to it, so they end a little later or earlier than others.
-
-    Raises:
-        ArgumentError: if it is not known to the end of the first frame.
     """
     horizon = scene.horizon
     grid = grid_of(horizon, frame)

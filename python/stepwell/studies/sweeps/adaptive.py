@@ -72,12 +72,7 @@ class _Evaluations(Reduction):
 
 
 def arguments(grid: Grid, method: Method, asked: Checked, outcomes: Iterable[Outcome]) -> tuple[dict[str, Any], Array]:
-    """Further arguments of ``integrate``, and the times.
-
-    Raises:
-        ArgumentError: what was given and what was expected.
-        UnsupportedError: if an argument is not supported with a tolerance.
-    """
+    """Further arguments of ``integrate``, and the times."""
     tolerance = asked["tolerance"]
     varied = {axis.argument: axis for axis in grid.axes}
     if "dt" in varied:

@@ -148,11 +148,7 @@ class Grid:
 
 
 def grid(axes: Any) -> Grid:
-    """The grid of the user's axes.
-
-    Raises:
-        ArgumentError: what was given and what was expected.
-    """
+    """The grid of the user's axes."""
     if not isinstance(axes, Mapping):
         order = "; axes stand before the method, sweep(system, axes, method)" if isinstance(axes, (str, Method)) else ""
         if callable(axes) or isinstance(axes, System):

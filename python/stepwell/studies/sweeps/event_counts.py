@@ -22,12 +22,7 @@ EVENTS = (int(Status.EVENT), int(Status.REST))
 
 
 def events_of(events: Any, outcomes: Iterable[Outcome], transient: Any) -> tuple[Event, ...]:
-    """The events, checked; only one occurrence of each is stored unless a function needs more.
-
-    Raises:
-        ArgumentError: what was given and what was expected.
-        UnsupportedError: if an argument is not supported with events.
-    """
+    """The events, checked; only one occurrence of each is stored unless a function needs more."""
     located = several(events)
     for event in located:
         if not event.name.isidentifier():

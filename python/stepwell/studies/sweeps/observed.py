@@ -137,11 +137,7 @@ def name_of(what: Of | Callable[..., Any]) -> str:
 
 
 def checked(what: Any) -> Of:
-    """An argument that should be an observable quantity, checked.
-
-    Raises:
-        ArgumentError: if not.
-    """
+    """An argument that should be an observable quantity, checked."""
     if isinstance(what, tuple):
         if len(what) < 2 or what[0] not in ("v", "y"):
             raise ArgumentError(f"of: expected a component such as ('y', 0), got {checks.short(what)}")

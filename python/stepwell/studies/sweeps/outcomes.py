@@ -43,11 +43,7 @@ Results = dict[str, Variable]
 
 
 def together(parts: Iterable[Results]) -> Results:
-    """The results of several outcomes in one dictionary.
-
-    Raises:
-        ArgumentError: if two have the same name.
-    """
+    """The results of several outcomes in one dictionary."""
     results: Results = {}
     for part in parts:
         if twice := sorted(set(results) & set(part)):
@@ -315,11 +311,7 @@ class _Mean(Reduction):
 
 
 def called(name: Any, of: Of | None) -> str | None:
-    """The user's name of results, or None.
-
-    Raises:
-        ArgumentError: if it is no name, or would be the name of two results, those of v and y.
-    """
+    """The user's name of results, or None."""
     if name is None:
         return None
     if of is None:

@@ -179,7 +179,6 @@ def bode(
         A ``Bode``.
 
     Raises:
-        ArgumentError: what was given and what was expected.
         UnsupportedError: if no method can step the system, or it is not linear.
 
     Example:

@@ -229,9 +229,6 @@ def figures(methods: Iterable[Method | str] | None = None, *, phi: float = 0.5, 
     Returns:
         A ``Figures``.
 
-    Raises:
-        ArgumentError: what was given and what was expected.
-
     Warns:
         DivergenceWarning: if samples leave the finite numbers.
 

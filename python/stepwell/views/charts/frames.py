@@ -140,11 +140,7 @@ def _palette(samples: Sequence[Pixels], number: int) -> tuple[Pixels, Pixels]:
 
 
 def write_mp4(frames: Frames, path: Path, rate: float) -> None:
-    """Write an .mp4 by the program ffmpeg.
-
-    Raises:
-        UnsupportedError: with its message, if ffmpeg fails.
-    """
+    """Write an .mp4 by the program ffmpeg."""
     from matplotlib.animation import FFMpegWriter
 
     height, width = frames.frame(frames.states[0]).shape[:2]

@@ -228,7 +228,6 @@ def stability_map(
         A ``StabilityMap``.
 
     Raises:
-        ArgumentError: what was given and what was expected.
         UnsupportedError: if the method cannot step a damped oscillator.
 
     Example:

@@ -130,7 +130,6 @@ def norm(
         A ``NormSweep``.
 
     Raises:
-        ArgumentError: what was given and what was expected.
         UnsupportedError: if a method cannot step a rigid body.
 
     Example:

@@ -183,7 +183,6 @@ class RunPicture(Drawn, Table, ValueEquality):
             progress: a function that is called with the share of the frames that are drawn, from 0 to 1; a page has none.
 
         Raises:
-            ArgumentError: what was given and what was expected.
             UnsupportedError: for .gif and .mp4, if matplotlib is missing; for .mp4, if ffmpeg is.
         """
         registry.task("animate_run")(self, path, seconds, fps, progress)
@@ -249,11 +248,7 @@ def run_picture(scene: Scene | str, run: Run) -> RunPicture:
 
 
 def own_picture(run: Run) -> RunPicture:
-    """The picture of a run on its own, without an exact solution: a scene is made of its system and its first saved state.
-
-    Raises:
-        ArgumentError: if the run is of a batch, or too little was saved.
-    """
+    """The picture of a run on its own, without an exact solution: a scene is made of its system and its first saved state."""
     if run.status.ndim:
         raise ArgumentError(f"run: expected a run of one member, got a batch of shape {run.status.shape}; integrate one of them")
     if len(run.t) < 2:

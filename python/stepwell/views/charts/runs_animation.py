@@ -51,12 +51,7 @@ Motion = tuple[Show, list[Any], list[Axes]]
 
 
 def need(path: str | Path, seconds: float, fps: float) -> tuple[float, float]:
-    """Raise if no such animation can be written, before any work is done; or return its seconds and frames a second.
-
-    Raises:
-        ArgumentError: if the ending is not that of an animation, or its length cannot be.
-        UnsupportedError: naming what is missing.
-    """
+    """Raise if no such animation can be written, before any work is done; or return its seconds and frames a second."""
     seconds = checks.number("seconds", seconds, positive=True, unit="seconds")
     fps = checks.number("fps", fps, positive=True, unit="frames a second")
     if seconds * fps > MOST_FRAMES:

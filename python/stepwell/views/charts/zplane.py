@@ -157,9 +157,6 @@ def stability(methods: Iterable[Method | str] | None = None, *, phi: Any = None)
     Returns:
         A ``Stability``.
 
-    Raises:
-        ArgumentError: what was given and what was expected.
-
     Example:
         >>> chart = sw.charts.stability(["rk4"])
         >>> round(chart.summary()[0]["limit"], 4)

@@ -69,11 +69,7 @@ def of_method(method: Method) -> dict[str, Any]:
 
 
 def of_scene(scene: Scene, methods: Sequence[Method]) -> dict[str, Any]:
-    """The data of a scene for the page.
-
-    Raises:
-        UnsupportedError: if none of the methods can step it, or its steps are too long for a page.
-    """
+    """The data of a scene for the page."""
     known = built_in(scene)
     offer = sliders.OFFERS[scene.name] if known else sliders.Offer()
     size, finite = sizes(scene)

@@ -59,7 +59,6 @@ def explore(scenes: Any = None, *, methods: Any = None) -> Explorer:
         An ``Explorer``: ``.save(path)`` writes the page, ``.open()`` shows it in the browser; a notebook shows it by itself.
 
     Raises:
-        ArgumentError: what was given and what was expected.
         UnsupportedError: if no method steps one of the scenes, or its steps are too long for a page.
 
     Example:

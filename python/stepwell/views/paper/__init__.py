@@ -150,10 +150,6 @@ def draw(folder: str | Path, section: str | None = None) -> list[Path]:
 
     Returns:
         The paths, in the order of Hoffmann (2002).
-
-    Raises:
-        ArgumentError: if nothing can be written there, or there is no such section, or it has no figure.
-        UnsupportedError: if matplotlib is missing.
     """
     from ...base.pictures import new_figure
 
