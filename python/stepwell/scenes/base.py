@@ -303,7 +303,6 @@ class Scene(ValueEquality):
 
     @cached_property
     def _groups(self) -> tuple[Whole, Whole]:
-        """The group of each number of v and of y."""
         groups = np.asarray(self.system.groups, dtype=np.int64)
         return groups[: self.v.size], groups[self.v.size :]
 
@@ -374,7 +373,6 @@ class Scene(ValueEquality):
             return self.system.energy(np.moveaxis(v, 0, -1), np.moveaxis(y, 0, -1))
 
     def _repr_html_(self) -> str:
-        """A table for notebooks."""
         return facts(
             f"{self.title} ({self.name})",
             [

@@ -93,7 +93,6 @@ class Tight:
         self._places.append((time, state, on))
 
     def _fresh(self, time: float, state: tuple[Array, Array], tolerance: float) -> dict[str, Any]:
-        """The arguments of a run that starts from this state."""
         return {"v": state[0], "y": state[1], "t0": time, "tolerance": tolerance} | self._options
 
     def _part(self, at: Array, i: int) -> tuple[Run, bool]:

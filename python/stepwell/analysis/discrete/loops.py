@@ -196,7 +196,6 @@ def sampling_limit(plant: Any, controller: Any, *, delay: float = 0.0, samples: 
 
 
 def _corners(plant: LinearSystem, controller: Any) -> Any:
-    """The corners of the loop of continuous time."""
     part = part_of("plant", plant, of_states=True)
     other = of_gain("controller", controller, 1, 1) if is_gain(controller) else part_of("controller", controller, of_states=True)
     try:

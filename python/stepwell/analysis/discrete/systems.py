@@ -150,7 +150,6 @@ class DiscreteSystem(ValueEquality):
         return replace(self, Q=product_of(self.Q, gain), Q_next=product_of(self.Q_next, gain), D=product_of(self.D, gain))
 
     def __rmul__(self, gain: Any) -> Any:
-        """The outputs times a number."""
         if not is_gain(gain):
             return self._with(gain, series)
         gain = of_gain("gain", gain, len(self.D), len(self.D)).D
@@ -165,15 +164,12 @@ class DiscreteSystem(ValueEquality):
     __radd__ = __add__
 
     def __sub__(self, other: Any) -> Any:
-        """Common inputs, and the difference of the outputs."""
         return self + -1.0 * other if isinstance(other, DiscreteSystem) or is_gain(other) else self._with(other, parallel)
 
     def __rsub__(self, gain: Any) -> Any:
-        """A gain less this system."""
         return -1.0 * self + gain
 
     def __neg__(self) -> Any:
-        """The outputs with the other sign."""
         return -1.0 * self
 
     def _with(self, other: Any, join: Callable[[Realisation, Realisation], Realisation]) -> Any:

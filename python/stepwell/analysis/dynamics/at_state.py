@@ -74,7 +74,6 @@ class Jacobian(ValueEquality):
         return by_growth(self.matrix)
 
     def _repr_html_(self) -> str:
-        """The matrix of one member and its eigenvalues, as a table for notebooks."""
         if self.matrix.ndim > 2:
             return facts(
                 "Jacobian",

@@ -249,7 +249,6 @@ def _placed(mu: Array, t: Array, dim: int, read: dict[str, Array]) -> Blocks:
 
 
 def _sizes(mu: Array, e: Array, read: dict[str, Array]) -> Blocks:
-    """The semi-major axis and the distance of the periapsis."""
     if "periapsis" in read:
         q = read["periapsis"]
         with np.errstate(divide="ignore"):

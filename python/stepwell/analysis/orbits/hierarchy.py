@@ -349,7 +349,6 @@ class _Before:
 
 
 def _centre(masses: Array, rows: Any, members: Sequence[int]) -> Array:
-    """The centre of mass; of bodies without mass, their mean."""
     if len(members) == 1:
         return np.asarray(rows[members[0]])
     total = masses[members].sum(axis=0)

@@ -84,7 +84,6 @@ class StabilityAlong(ValueEquality):
         return self.run_dt > self.limits
 
     def _repr_html_(self) -> str:
-        """The smallest limit and where it is set, as a table for notebooks."""
         pairs: list[tuple[str, Any]] = [("method", self.method.title), ("step of the run", cell(self.run_dt))]
         if self.limits.ndim > 1:
             return facts(

@@ -353,7 +353,6 @@ def goes_forward(run: Run) -> None:
 
 
 def _along(system: System, method: Method, dt: Array, run: Run) -> Analysis:
-    """The analysis at every saved state of a run."""
     goes_forward(run)
     if run.t.ndim > 1:
         raise UnsupportedError("at: expected a run whose members have their times in common; analyse a run for each t0")

@@ -159,7 +159,6 @@ class LinearSystem(System):
         return joined(series(gain._replace(x=own.x), own._replace(x=gain.x)))
 
     def __rmul__(self, gain: Any) -> LinearSystem:
-        """The outputs times a number."""
         if not is_gain(gain):
             return NotImplemented
         from .realisation import of_gain, series  # only joined systems need it
@@ -179,15 +178,12 @@ class LinearSystem(System):
     __radd__ = __add__
 
     def __sub__(self, other: Any) -> LinearSystem:
-        """Common inputs, and the difference of the outputs."""
         return self + -1.0 * other if isinstance(other, LinearSystem) or is_gain(other) else NotImplemented
 
     def __rsub__(self, other: Any) -> LinearSystem:
-        """A gain less this system."""
         return -1.0 * self + other if is_gain(other) else NotImplemented
 
     def __neg__(self) -> LinearSystem:
-        """The outputs with the other sign."""
         return -1.0 * self
 
     def repr_arguments(self) -> list[str]:

@@ -170,7 +170,6 @@ class Branched:
         return [(condition, ()), *read]
 
     def _choices(self) -> list[int]:
-        """The choices among the operations."""
         return [line for line in self.order if self.nodes[line].name in CHOICES and self._sides(line) is not None]
 
     def _side(self, line: int, side: bool) -> Path:

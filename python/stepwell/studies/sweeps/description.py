@@ -69,7 +69,6 @@ def layout_of(task: Task, grid: Grid, system: System, bits: str, units: dict[str
 
 
 def _step_facts(task: Task, grid: Grid) -> dict[str, Any]:
-    """The length and the number of steps."""
     if task.at is None:
         dt = {} if grid.of_dt else {"dt": task.options["dt"]}
         return {**dt, "steps": task.steps, "transient": task.transient, "observe": task.observe}

@@ -106,7 +106,6 @@ def _image(codes: Pixels, colours: Pixels, before: Pixels | None) -> Any:
 
 
 def _gif(images: Iterable[Any], colours: int, rate: float = 1.0) -> bytes:
-    """The bytes of a .gif of these frames."""
     rest, written = iter(images), BytesIO()
     first = next(rest)
     options: dict[str, Any] = {"duration": round(1000.0 / rate), "loop": 0, "transparency": colours, "disposal": 1}

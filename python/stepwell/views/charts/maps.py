@@ -285,7 +285,6 @@ def _fitted(method: Method, damping: tuple[float, float] | None) -> float:
 
 
 def _ends(argument: str, value: Any, unit: str) -> tuple[float, float]:
-    """The two ends of an axis."""
     ends = checks.numbers(argument, value, unit=unit)
     if ends.shape != (2,):
         raise ShapeError(f"{argument}: expected two numbers, from where to where, got an array of shape {ends.shape}")

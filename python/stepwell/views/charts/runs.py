@@ -293,7 +293,6 @@ def _energy_error(scene: Scene, run: Run) -> tuple[Array | None, str]:
 
 
 def _largest_kinetic(scene: Scene, run: Run, energy: Array) -> float:
-    """The largest kinetic energy of the saved states."""
     places = np.moveaxis(run.y, 0, -1)
     with np.errstate(all="ignore"):
         kinetic = energy - np.asarray(scene.system.energy(np.zeros((*scene.v.shape, 1)), places))
@@ -306,7 +305,6 @@ def _of_points(y: Array) -> Array:
 
 
 def _largest(error: Array | None) -> float | None:
-    """The largest that is known, or None."""
     if error is None or np.isnan(error).all():
         return None
     return float(np.nanmax(error))

@@ -200,7 +200,6 @@ def _swing(figure: Figure, chart: RunPicture) -> Motion:
 
 
 def _rows(figure: Figure, chart: RunPicture) -> Motion:
-    """The coordinates side by side."""
     values, size = side_by_side(chart)
     n = values.shape[1]
     numbers = np.arange(1, n + 1)

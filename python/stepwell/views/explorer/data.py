@@ -154,7 +154,6 @@ def _sources(
 
 
 def _source(scene: Scene, method: Method, control: AnyControl | None) -> str:
-    """A step as JavaScript."""
     options: dict[str, Any] = {"dt": scene.dt, "v": scene.v, "y": scene.y, "control": control}
     numbers = scene.v.size + scene.y.size
     if method.is_implicit and numbers > MAX_UNKNOWNS:

@@ -159,7 +159,6 @@ class Explorer(ValueEquality):
         return Path(file.name)
 
     def _repr_html_(self) -> str:
-        """The page in a frame, for a notebook."""
         inside = html.escape(self.html, quote=True)
         style = f"width:100%;height:{NOTEBOOK_HEIGHT}px;border:1px solid #8888"
         return f'<iframe title="stepwell explorer" style="{style}" srcdoc="{inside}"></iframe>'

@@ -36,7 +36,6 @@ class Finding(NamedTuple):
     numbers: str
 
     def _repr_html_(self) -> str:
-        """The result as a table, for notebooks."""
         return facts("Checked", [("holds", "yes" if self.holds else "no"), ("numbers", self.numbers)])
 
 
@@ -67,7 +66,6 @@ class Entry(NamedTuple):
         return shortened(f"<Hoffmann (2002), {self.section}, {self.kind}: {self.says}>", MAX_LINE)
 
     def _repr_html_(self) -> str:
-        """The statement as a table, for notebooks."""
         pairs = [("kind", self.kind), ("statement", self.says), ("correction", self.corrected), ("in stepwell", self.here)]
         return facts(f"Hoffmann (2002), {self.section}", [*pairs, ("picture", self.picture)])
 
