@@ -120,9 +120,6 @@ class ControllerDefinition:
             delay: the time from a sample to the output of its result, a whole number of steps.
             **values: parameters and initial values of its state by name, each a number or an array over the batch (whose axes
                 come after its own, if the default has some).
-
-        Raises:
-            ArgumentError: if there is no such parameter, or a value is wrong.
         """
         for name in values:
             if name not in self.parameters and name not in self.memory:
@@ -197,7 +194,6 @@ def controller(function: Callable[..., Any], /) -> ControllerDefinition:
         ``Controller``, which ``system.surrounded`` puts around a system.
 
     Raises:
-        ArgumentError: what is wrong with the function's arguments.
         TraceError: at the first use with a state, if the function does what cannot be traced; the message names the line.
 
     Example:

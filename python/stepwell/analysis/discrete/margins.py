@@ -87,9 +87,6 @@ def margins(loop: Any, *, delay: float = 0.0) -> Margins:
         loop: a linear system, from the sum to where the feedback is taken; or a ``DiscreteSystem``, seen up to π/dt.
         delay: dead time in the loop, in units of time; that of a ``DiscreteSystem`` is an argument of ``discretise``.
 
-    Returns:
-        The ``Margins``.
-
     Raises:
         ArgumentError: if it is no such system, or has several inputs, outputs or members.
 

@@ -194,9 +194,6 @@ class DiscreteSystem(ValueEquality):
 
         Returns:
             Complex numbers, shape (*frequencies, *batch); of several inputs or outputs (*frequencies, r, m, *batch).
-
-        Raises:
-            ArgumentError: if ``omega`` is no such array.
         """
         omega = checks.numbers("omega", omega, unit="rad per unit of time")
         z = np.exp(1j * self.dt * omega)
@@ -213,9 +210,6 @@ class DiscreteSystem(ValueEquality):
 
         Returns:
             A ``SampledRun`` of as many samples.
-
-        Raises:
-            ArgumentError: if an argument has a wrong shape.
         """
         samples, (n, m) = checks.numbers("x", x), self.Q.shape[:2]
         if m == 1 and samples.ndim:
@@ -294,9 +288,6 @@ def discretise(
         delay: dead time of the inputs, in units of time, zero or more: that of a computer, a bus, a valve. It need not be a
             multiple of dt: in an exact step the input then changes within the step, once. The samples that are under way are
             states behind those of the system, the newest first.
-
-    Returns:
-        A ``DiscreteSystem``.
 
     Raises:
         UnsupportedError: if the system is not linear, or the method cannot step it.

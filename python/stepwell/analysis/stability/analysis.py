@@ -196,7 +196,6 @@ class Analysis(ValueEquality):
             The figure; a notebook shows it.
 
         Raises:
-            ArgumentError: if there is no such format.
             UnsupportedError: if matplotlib is missing.
 
         Example:

@@ -262,20 +262,12 @@ class LinearSystem(System):
         return f"B[{order[row]},{self._columns()[column - len(order)]}]"
 
     def split(self, state: Any) -> tuple[Array, Array]:
-        """The blocks (v, y) of a state in the order of A, shape (n, *batch).
-
-        Raises:
-            ArgumentError: if the state is wrong.
-        """
+        """The blocks (v, y) of a state in the order of A, shape (n, *batch)."""
         array = checks.block("state", state, (len(self.A),), self.axes)
         return array[list(self.velocities)], array[list(self.coordinates)]
 
     def state(self, v: Any, y: Any) -> Array:
-        """The state in the order of A, shape (n, *batch), of the blocks v and y: undoes ``split``.
-
-        Raises:
-            ArgumentError: if a block is wrong.
-        """
+        """The state in the order of A, shape (n, *batch), of the blocks v and y: undoes ``split``."""
         v = checks.block("v", v, self.v_shape, self.axes, finite=False)
         y = checks.block("y", y, self.y_shape, self.axes, finite=False)
         batch = checks.batch_shape({"v": v.shape[1:], "y": y.shape[1:]})

@@ -71,7 +71,6 @@ class ControlSweep(Drawn, Table, ValueEquality):
         """The line of that method and kind, with this number of evaluations; the first number if None.
 
         Raises:
-            UnknownNameError: if there is no such line.
             ArgumentError: if there are no runs with this number of evaluations.
         """
         name = find_method(method).name

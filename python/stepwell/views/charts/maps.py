@@ -104,12 +104,6 @@ class StabilityMap(Table, ValueEquality):
 
         Args:
             steps: N, how many steps are made.
-
-        Returns:
-            An ``Observation``.
-
-        Raises:
-            ArgumentError: if there are no steps.
         """
         steps = checks.count("steps", steps, 1)
         norms = self.nonnormal[self.stable]
@@ -223,9 +217,6 @@ def stability_map(
         damping: the range (lower, upper) of the damping ratio D, dimensionless, both ends included; None for the undamped
             oscillator over Φ alone, which every method can step.
         size: number of points over each axis, or a pair: over Φ, over D.
-
-    Returns:
-        A ``StabilityMap``.
 
     Raises:
         UnsupportedError: if the method cannot step a damped oscillator.

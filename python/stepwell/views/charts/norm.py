@@ -126,9 +126,6 @@ def norm(
         gains: h·k of the control, shape (gains,), without a unit.
         progress: a function that is called with the fraction that is done.
 
-    Returns:
-        A ``NormSweep``.
-
     Raises:
         UnsupportedError: if a method cannot step a rigid body.
 

@@ -41,7 +41,6 @@ class Panel(Drawn, Table, ValueEquality):
         """Draw the scenes beside each other, and write the picture to ``path`` if given; ``error`` as of ``WorkPrecision.plot``.
 
         Raises:
-            ArgumentError: if there is no such error or format.
             UnsupportedError: if matplotlib is missing.
         """
         return drawn(path, lambda: self.draw(error))

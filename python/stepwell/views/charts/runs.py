@@ -222,9 +222,6 @@ def run_picture(scene: Scene | str, run: Run) -> RunPicture:
         scene: the ``Scene`` that was run, or its name.
         run: what ``scene.run(…, every=…)`` returned, with two states or more.
 
-    Returns:
-        A ``RunPicture``.
-
     Raises:
         ArgumentError: if the run is not of that scene, or keeps too little.
 

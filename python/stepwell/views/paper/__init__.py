@@ -116,9 +116,6 @@ def entries(section: str | None = None) -> tuple[Entry, ...]:
     Returns:
         An ``Entry`` for each.
 
-    Raises:
-        ArgumentError: if there is no such section.
-
     Example:
         >>> [entry.kind for entry in sw.paper.entries("§5")]
         ['algorithm', 'formula', 'figure']
