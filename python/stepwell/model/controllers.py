@@ -58,14 +58,9 @@ class Timing(NamedTuple):
 
 
 class Target(NamedTuple):
-    """A parameter of a system that a controller sets.
+    """A parameter of a system that a controller sets, by its name among arguments, in the equations, and of rows in the core.
 
-    Attributes:
-        name: its name among the arguments of the system.
-        key: its name among the parameters of the system's equations.
-        place: its place, if it stands in a list of inputs under that name.
-        row: the name of its rows in the core.
-        shape: the shape of its numbers for a member.
+    ``place`` is its place if it stands in a list of inputs under that name, ``shape`` the shape of its numbers for a member.
     """
 
     name: str

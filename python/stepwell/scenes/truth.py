@@ -49,11 +49,7 @@ Mask = np.ndarray[Any, np.dtype[np.bool_]]
 class Tight:
     """The run of a scene to a tight tolerance, as a function of time; it does not depend on the times of earlier calls.
 
-    Args:
-        scene: the scene, whose control is left out.
-        tolerance: the tolerance of the run.
-        part: its longest step, as a part of that of the reference.
-        method: the method.
+    The scene's control is left out; the longest step is this ``part`` of that of the reference.
     """
 
     def __init__(self, scene: Scene, tolerance: float = TIGHT_TOLERANCE, part: float = 1.0, method: str = METHOD) -> None:

@@ -41,15 +41,9 @@ MAX_WHOLE = 20_000
 
 
 class Traced:
-    """Values that depend on a system's state, on a tape of their own.
+    """Values that depend on a system's state, on a tape of their own, with the functions marked on it.
 
-    Attributes:
-        system: the system.
-        tape: the tape of all values.
-        marks: the functions on it.
-        state: the symbols of a member's numbers, v first.
-        roots: the symbols of the values.
-        length: how many numbers a state has.
+    ``state`` has the symbols of a member's numbers, v first; ``roots`` are those of the values.
     """
 
     def __init__(self, system: System, what: str, method: Method | None = None) -> None:

@@ -18,15 +18,9 @@ EPS = float(np.finfo(np.float64).eps)
 
 
 class Realisation(NamedTuple):
-    """ṡ = A·s + B·x, z = C·s + D·x. A gain alone has no states.
+    """ṡ = A·s + B·x, z = C·s + D·x. A gain alone has no states. The batch is behind the rows and columns of the matrices.
 
-    Attributes:
-        A: shape (n, n, *batch).
-        B: shape (n, m, *batch).
-        C: shape (r, n, *batch).
-        D: shape (r, m, *batch).
-        velocities: the states that are velocities.
-        x: the inputs, one for each column of B; None for zero.
+    ``velocities`` are the states that are velocities, ``x`` the inputs, one for each column of B; None for zero.
     """
 
     A: Array

@@ -115,14 +115,9 @@ def prefix(name: object) -> str:
 
 
 class Field(NamedTuple):
-    """A parameter in the structure of a file.
+    """A parameter in the structure of a file: its name, its description, its default numbers in C order.
 
-    Attributes:
-        name: its name in the file.
-        about: its description.
-        values: its default numbers, in C order.
-        shape: the shape of an array; () for a number.
-        wide: whether it is float64 even in a file of float32.
+    The shape of a number is (). A ``wide`` one is float64 even in a file of float32.
     """
 
     name: str

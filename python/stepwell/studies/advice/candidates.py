@@ -127,17 +127,10 @@ class Fixed:
 
 
 class Single(Fixed):
-    """Steps of one length in float32.
+    """Steps of one length in float32; ``wide`` are the runs with the same steps in float64.
 
-    Shorter steps do not help where rounding alone is above the allowed error, so the search ends there.
-
-    Args:
-        method: the method.
-        trials: runs in float32.
-        grid: the possible steps.
-        share: the fraction of the allowed error that a run may have.
-        wide: the runs with the same steps in float64.
-        allowed: the state error that its runs may have.
+    Shorter steps do not help where rounding alone is above the allowed error, so the search ends there. A run may have this
+    ``share`` of it.
     """
 
     dtype = "float32"

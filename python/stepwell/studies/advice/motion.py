@@ -47,13 +47,7 @@ CACHED_ANSWERS = 96
 
 
 class Grid(NamedTuple):
-    """The possible steps: k = 1, 2, … of them in a span of time.
-
-    Attributes:
-        span: the frame, or the whole horizon without one, in units of time.
-        spans: the number of spans that reach the horizon.
-        framed: whether the spans are frames.
-    """
+    """The possible steps: k = 1, 2, … in a span, a frame or else the whole horizon; so many spans reach the horizon."""
 
     span: float
     spans: int

@@ -146,13 +146,7 @@ def numbers_of_waypoints(state: int) -> int:
 
 
 class Pieces:
-    """The pieces of the run of a chunk, and where its members stood on the way if stiffness is looked for.
-
-    Args:
-        system: the system of the chunk.
-        method: the method.
-        looks: whether stiffness is looked for.
-    """
+    """The pieces of the run of a chunk, and where its members stood on the way if it ``looks`` for stiffness."""
 
     def __init__(self, system: System, method: Method, *, looks: bool) -> None:
         self.system, self._method, self._looks = system, method, looks

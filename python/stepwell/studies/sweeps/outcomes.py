@@ -22,14 +22,9 @@ from .observed import Observed, Of, Piece, Rows, block_dims, checked, dtype_of, 
 
 
 class Variable(NamedTuple):
-    """A result of the members of a chunk.
+    """A result of the members of a chunk, shape (*own axes, members), with names and coordinates of its own axes.
 
-    Attributes:
-        dims: names of its own axes.
-        values: shape (*own axes, members).
-        about: its description.
-        unit: the quantity whose unit it has, "v", "y" or "t"; None for others.
-        coords: coordinates along its own axes, by name.
+    ``unit`` is the quantity whose unit it has, "v", "y" or "t"; None for others.
     """
 
     dims: tuple[str, ...]

@@ -31,13 +31,9 @@ BITS = 5
 
 
 class Frames:
-    """The frames of a figure, of which only the animated artists are drawn anew.
+    """The frames of a figure, one for each saved state, of which only the ``animated`` artists are drawn anew.
 
-    Args:
-        figure: the figure; what moves on it is ``animated``.
-        show: shows a saved state on it.
-        states: the saved states, one for each frame.
-        progress: called with the share that is done.
+    ``show`` shows a state on the figure; ``progress`` is called with the share that is done.
     """
 
     def __init__(
