@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 import stepwell as sw
 from stepwell.studies.advice import by_cost_and_error, knows_motion
-from stepwell.studies.advice.candidates import Candidate
 from stepwell.studies.advice.costs import Times, cost_noise
 from stepwell.studies.advice.result import about
 from stepwell.studies.advice.search import Search
@@ -235,7 +234,7 @@ class Made:
 
 
 def searched(error: Any, tolerance: float) -> int:
-    candidate: Candidate = Made(error)
+    candidate: Any = Made(error)
     choices, missed = Search(tolerance, 1, {"made": 1.0}, 1e7).run([candidate])
     assert not missed
     return choices["made"].k

@@ -151,7 +151,6 @@ class _Run:
         self.machine.start(self.program.kernel(name), size, local, *arguments)
 
     def share(self, share: Share) -> None:
-        """Step some members to their ends."""
         machine, arrays, pacing, width = self.machine, self.arrays, self.pacing, share.end - share.first
         group = 64 if width >= 64 else 1
         before = np.zeros((self.rows, width))
@@ -202,7 +201,6 @@ class _Run:
         return numbers
 
     def read(self, share: Share, rows: Any, marks: Any, saved: list[Any], steps: list[Any], waypoints: Any) -> None:
-        """Take from the device what members have come to."""
         arrays, width, machine = self.arrays, share.end - share.first, self.machine
         columns = slice(share.first, share.end)
 
@@ -275,7 +273,6 @@ class _Kernels:
         return lines + [f"marks[{i} * width + c] = {name};" for i, name in enumerate(MARKS)]
 
     def begin(self) -> list[str]:
-        """The kernel that brings members to their start."""
         of, begin = self.of, []
         if "begin" in self.texts and not self.stages.single:
             text = self.texts["begin"]
@@ -303,7 +300,6 @@ class _Kernels:
         ]
 
     def save(self, v: str, y: str, at: str) -> list[str]:
-        """Statements that put the state into rows of saved ones."""
         lines = [f"{v}[({at} * {self.n_v} + {i}) * width + c] = {self.row}{i};" for i in range(self.n_v)]
         return lines + [f"{y}[({at} * {self.n_y} + {i}) * width + c] = {self.row}{self.n_v + i};" for i in range(self.n_y)]
 
@@ -352,7 +348,6 @@ class _Kernels:
         ]
 
     def attempt(self) -> list[str]:
-        """Statements that make an attempt."""
         texts, of, n = self.texts, self.of, self.state
         step = texts["step"]
         if not self.stages.single:
@@ -478,7 +473,6 @@ class _Kernels:
         ]
 
     def attempts(self) -> list[str]:
-        """The kernel that makes attempts."""
         of, n, texts = self.of, self.state, self.texts
         t, h, target, extra, held = (of[name] for name in ("t", "h", "target", "extra", "held"))
         accepted, rejected, wall = of["accepted"], of["rejected"], of["wall"]

@@ -19,13 +19,9 @@ WRITTEN = frozenset({"v", "y", "kept v", "kept y", "dv", "dy", "velocity", "add"
 
 
 class Pass(NamedTuple):
-    """A kernel over all numbers of a block.
+    """A kernel over all numbers of a block, with the blocks that it reads, and writes unless it computes places.
 
-    Attributes:
-        name: the name of the kernel.
-        reads: the blocks that it reads.
-        writes: the blocks that it writes; none if it computes places.
-        asks: the block of h·v̇ at the places that it computes; "" if it computes none.
+    ``asks`` is the block of h·v̇ at the places that it computes; "" if it computes none.
     """
 
     name: str
@@ -35,13 +31,10 @@ class Pass(NamedTuple):
 
 
 class Stage(NamedTuple):
-    """A stage of a method.
+    """A stage of a method: its kernels, in order, and their text.
 
-    Attributes:
-        passes: its kernels, in order.
-        text: their text.
-        last: the block of h·v̇ at the places at the end, as the next step may begin with it; "" if it is not asked for, or depends
-            on more than places.
+    ``last`` is the block of h·v̇ at the places at the end, as the next step may begin with it; "" if it is not asked for, or
+    depends on more than places.
     """
 
     passes: list[Pass]

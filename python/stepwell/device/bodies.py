@@ -246,7 +246,6 @@ class _Run:
         return bool((self.arrays.first_bad >= 0).any())
 
     def copy(self, of: Any) -> Any:
-        """A copy of what is on the device."""
         to = self.machine.room(of.size)
         self.machine.copy(to, of)
         return to
@@ -359,7 +358,6 @@ class _Run:
             self.in_launches("pulled", members * bodies.alone, max(1, bodies.n), *counts, bodies.massless, *of_round)
 
     def push(self, out: Any) -> None:
-        """Add the force from outside."""
         if self.bodies.push is not None:
             self.call("pushed", self.bodies.count, np.int64(self.bodies.count), self.bodies.push, out)
 
@@ -419,7 +417,6 @@ class _Run:
         return at + 1
 
     def read(self, name: str, to: Array) -> None:
-        """Take a block from the device."""
         bodies = self.bodies
         values = np.empty((bodies.members, bodies.dim, bodies.all))
         self.machine.get(values, self.blocks[name])
@@ -487,7 +484,6 @@ class _Run:
         return dict(zip(names, np.split(recorded[0], np.cumsum(sizes)[:-1]), strict=True))
 
     def finish(self) -> None:
-        """Take from the device what is left there at the end."""
         arrays = self.arrays
         bad = np.empty(self.bodies.members, np.int64)
         self.machine.get(bad, self.bad)

@@ -161,7 +161,6 @@ class _Run:
         return bool((arrays.first_bad >= 0).any())
 
     def launches(self) -> Iterator[Launch]:
-        """The launches of the run, each about as long as it may be."""
         plan, sizes = self.plan, self.stages.sizes
         each = (sizes["v"] + sizes["y"] + sizes["recorded"]) * self.members * self.bytes
         at_once = max(1, min(MOST_SAVED, self.machine.largest) // max(1, each)) if self.observer is None else plan.steps
@@ -181,7 +180,6 @@ class _Run:
             left -= every
 
     def steps(self, launch: Launch, done: int) -> None:
-        """Start a launch of steps."""
         plan, sizes, count = self.plan, self.stages.sizes, launch.intervals * launch.length
         first, entries = plan.first + done, len(self.stages.texts["step"].entries)
         of_time = np.float64(plan.t0), np.float64(plan.dt)
@@ -222,7 +220,6 @@ class _Run:
         return at + count
 
     def take(self, at: int, count: int) -> None:
-        """Take so many saved states from the device."""
         arrays = self.arrays
         n_v = self.stages.sizes["v"]
         for to, buffer, n in zip(
@@ -240,7 +237,6 @@ class _Run:
                 rows[...] = taken
 
     def finish(self) -> None:
-        """Take from the device what is left there at the end."""
         arrays, sizes = self.arrays, self.stages.sizes
         bad = np.empty(self.members, np.int64)
         self.machine.get(bad, self.bad)

@@ -90,13 +90,7 @@ def device_of(name: Any) -> Machine | None:
 
 
 class Machine:
-    """A device with a context and a queue of its own.
-
-    Attributes:
-        described: what ``devices`` tells of it.
-        cl: the module pyopencl.
-        device: its device.
-    """
+    """A device with a context and a queue of its own; ``described`` is what ``devices`` tells of it."""
 
     def __init__(self, cl: Any, device: Any, name: str) -> None:
         self.cl, self.device = cl, device
@@ -244,11 +238,7 @@ class Machine:
 
 
 class Programs:
-    """Kernels of several texts: each text is built once, whatever others stand beside it in a run.
-
-    Attributes:
-        lock: what a run holds that starts kernels.
-    """
+    """Kernels of several texts: each text is built once, whatever others stand beside it in a run, which holds ``lock``."""
 
     def __init__(self, machine: Machine, texts: list[str]) -> None:
         built = [(text, machine.program(text)) for text in texts]

@@ -40,11 +40,7 @@ OF_BITS = {"and": "{} & {}", "or": "{} | {}", "exclusive or": "{} ^ {}", "add bi
 
 
 class Printer:
-    """Writes bodies; names begin with a prefix, so that several stand in one kernel.
-
-    Args:
-        single: whether numbers are float32.
-    """
+    """Writes bodies, of float32 if ``single``; names begin with a prefix, so that several stand in one kernel."""
 
     def __init__(self, single: bool) -> None:
         self._precision = SINGLE if single else DOUBLE

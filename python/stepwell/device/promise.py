@@ -92,7 +92,6 @@ def _numbers(single: bool) -> Array:
 
 
 def _expected(numbers: Array) -> list[Array]:
-    """The results by NumPy."""
     a, b, c = np.ascontiguousarray(numbers.T)
     kind: Any = numbers.dtype.type
     bits: Any = np.uint32 if kind is np.float32 else np.uint64

@@ -67,13 +67,7 @@ CASES
 
 
 class Reader:
-    """The lists of some bodies.
-
-    Attributes:
-        lines: their lines.
-        constants: their constants, by their bits.
-        places: how many places of a member they need.
-    """
+    """The lists of some bodies: lines, constants by their bits, and how many places of a member they need."""
 
     def __init__(self, single: bool) -> None:
         self.lines: list[tuple[int, ...]] = []

@@ -23,15 +23,9 @@ from .stages import Numbers, Stages
 
 
 class Live(NamedTuple):
-    """An array of a parameter, which is read before steps.
+    """An array of a parameter, which is read before steps; its numbers are above ``least`` and at most ``most``.
 
-    Attributes:
-        name: its name.
-        array: the array.
-        last: its numbers as they were read last.
-        place: the number of its rows among those of the model.
-        least: what each number is above.
-        most: what each number is at most.
+    ``last`` has its numbers as they were read last, ``place`` is the number of its rows among those of the model.
     """
 
     name: str

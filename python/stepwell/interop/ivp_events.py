@@ -61,14 +61,7 @@ class Event:
 
 
 class Part(NamedTuple):
-    """A part of a step in which an event function has at most one zero.
-
-    Attributes:
-        low: the share of the step where it begins.
-        high: and where it ends.
-        g_low: the value of the function there.
-        g_high: likewise.
-    """
+    """A part of a step in which an event function has at most one zero: its ends as shares of the step, the values there."""
 
     low: float
     high: float

@@ -91,13 +91,7 @@ def remember(memory: dict[Any, Any], key: Any, value: Any) -> None:
 
 
 def known(fun: Any, args: tuple[Any, ...], size: int, vectorized: bool) -> Known:
-    """The system of a function, traced unless that was done before of all that it reads: see ``recognised``.
-
-    Raises:
-        DTypeError: if there is no function that can be traced.
-        ArgumentError: if it does not take the arguments.
-        TraceError: if the function does what cannot be traced.
-    """
+    """The system of a function, traced unless that was done before of all that it reads: see ``recognised``."""
     reads = fun, args, size, vectorized
     numbers = numbers_of(reads)
     try:
@@ -237,11 +231,7 @@ def traceable(fun: Any) -> Callable[..., Any]:
 
 
 def arguments(args: Any) -> tuple[Any, ...]:
-    """The further arguments of a function.
-
-    Raises:
-        ArgumentError: if they are not a tuple.
-    """
+    """The further arguments of a function."""
     if args is None:
         return ()
     if isinstance(args, (tuple, list)) or (isinstance(args, np.ndarray) and args.ndim):
@@ -250,11 +240,7 @@ def arguments(args: Any) -> tuple[Any, ...]:
 
 
 def takes(argument: str, function: Any, args: tuple[Any, ...]) -> None:
-    """Raise if a function cannot be called with a time, a state and the further arguments.
-
-    Raises:
-        ArgumentError: the parameters of the function, and the number of arguments.
-    """
+    """Raise if a function cannot be called with a time, a state and the further arguments."""
     name = checks.short(getattr(function, "__name__", type(function).__name__))[1:-1]
     try:
         expected = inspect.signature(function)

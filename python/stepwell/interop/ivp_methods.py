@@ -22,10 +22,6 @@ def chosen(method: Any, tolerance: float) -> tuple[Method, Method | None]:
     """The method of that name, or of that class of SciPy, and the one to go over to if equations are stiff, or None.
 
     In place of methods for stiff equations that are not here the one for this relative tolerance is taken, with a warning.
-
-    Raises:
-        UnknownNameError: if there is none of that name.
-        UnsupportedError: if it cannot choose its steps.
     """
     if method is None:
         return find_method(DEFAULT), None

@@ -79,9 +79,6 @@ def load(path: str | Path, *, system: Any = None) -> Run:
         system: for a run of your own equations, what ``stepwell.system`` returned for their function; where a parameter is a
             function of time, the system with this parameter. Not needed if an imported module has the function by its name.
 
-    Returns:
-        The ``Run``.
-
     Raises:
         ArgumentError: if there is no such file; if it has no run; if the function is missing, or makes other operations than when
             the run was saved.

@@ -140,7 +140,6 @@ def solve_ivp(
         ``message`` and ``success``.
 
     Raises:
-        ArgumentError: if an argument is wrong.
         TraceError: if an operation of ``fun`` cannot be traced.
         UnknownNameError: if there is no such method; for a method of SciPy that stepwell lacks, it says what to write.
 
@@ -252,7 +251,6 @@ def _ended(trajectory: Trajectory, events: list[Event], values: list[list[float]
 def _result(
     trajectory: Trajectory, ended: float | None, t: Array, y: Array, sol: Solution | None, events: list[Event] | None
 ) -> OdeResult:
-    """The result, with SciPy's names."""
     status = 1 if ended is not None else -1 if trajectory.status in FAILURES else 0
     n = len(trajectory.states[0])
     solver = trajectory.method
@@ -324,7 +322,6 @@ def _tolerances(rtol: Any, atol: Any, n: int) -> tuple[Array, Array]:
 
 
 def _warn_of_useless(**arguments: Any) -> None:
-    """Warn of arguments that only methods for stiff equations read."""
     if useless := [name for name, value in arguments.items() if value is not None]:
         warnings.warn(
             f"{', '.join(useless)}: of no use, for derivatives come from the operations of fun, and steps have no least length",

@@ -94,11 +94,7 @@ FORCE = "added.force"
 
 
 class Force(Part):
-    """A force from outside, which is added to v̇ in every stage; the run has its numbers.
-
-    Args:
-        axes: how many axes a block of v has.
-    """
+    """A force from outside, which is added to v̇, whose block has ``axes`` axes, in every stage; the run has its numbers."""
 
     kind = "force"
 

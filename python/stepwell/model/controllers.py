@@ -58,14 +58,9 @@ class Timing(NamedTuple):
 
 
 class Target(NamedTuple):
-    """A parameter of a system that a controller sets.
+    """A parameter of a system that a controller sets, by its name among arguments, in the equations, and of rows in the core.
 
-    Attributes:
-        name: its name among the arguments of the system.
-        key: its name among the parameters of the system's equations.
-        place: its place, if it stands in a list of inputs under that name.
-        row: the name of its rows in the core.
-        shape: the shape of its numbers for a member.
+    ``place`` is its place if it stands in a list of inputs under that name, ``shape`` the shape of its numbers for a member.
     """
 
     name: str
@@ -120,9 +115,6 @@ class ControllerDefinition:
             delay: the time from a sample to the output of its result, a whole number of steps.
             **values: parameters and initial values of its state by name, each a number or an array over the batch (whose axes
                 come after its own, if the default has some).
-
-        Raises:
-            ArgumentError: if there is no such parameter, or a value is wrong.
         """
         for name in values:
             if name not in self.parameters and name not in self.memory:
@@ -197,7 +189,6 @@ def controller(function: Callable[..., Any], /) -> ControllerDefinition:
         ``Controller``, which ``system.surrounded`` puts around a system.
 
     Raises:
-        ArgumentError: what is wrong with the function's arguments.
         TraceError: at the first use with a state, if the function does what cannot be traced; the message names the line.
 
     Example:
@@ -346,11 +337,7 @@ class Controller(Part):
         return s
 
     def over_steps(self, dt: float) -> Controller:
-        """This controller with its period and its delay in steps of this length.
-
-        Raises:
-            ArgumentError: if they are no whole numbers of steps.
-        """
+        """This controller with its period and its delay in steps of this length."""
         steps, late = _whole("period", self.period, abs(dt)), _whole("delay", self.delay, abs(dt))
         if steps < 1:
             raise ArgumentError(f"period: expected a step of at most {self.period:g}, got dt = {dt:g}")
@@ -597,11 +584,7 @@ class Controllers(Controller):
         return changed(self, each=tuple(each.member(one) for each in self.each))
 
     def over_steps(self, dt: float) -> Controller:
-        """Return these controllers with their times in steps of this length; within, those of each in samples of the whole.
-
-        Raises:
-            ArgumentError: if they are no whole numbers of steps.
-        """
+        """Return these controllers with their times in steps of this length; within, those of each in samples of the whole."""
         each = [one.over_steps(dt) for one in self.each]
         tick = gcd(*(steps for one in each for steps in (one._timing().steps, one._timing().later)))
         inner = (Timing(one._timing().steps // tick, one._timing().waiting, one._timing().later // tick) for one in each)
@@ -653,11 +636,7 @@ class Controllers(Controller):
 
 
 def _output_rows(system: System) -> Array:
-    """The rows of C of a linear system whose outputs a controller reads.
-
-    Raises:
-        UnsupportedError: if it has none, or they are not functions of the state alone that all members have in common.
-    """
+    """The rows of C of a linear system whose outputs a controller reads."""
     C, D = (getattr(system, name, None) for name in "CD") if system.kernel == "linear" else (None, None)
     if C is None:
         raise UnsupportedError(
@@ -700,11 +679,7 @@ def _whole(name: str, time: float, dt: float) -> int:
 
 
 def target(system: System, name: str) -> Target:
-    """The parameter of a system that a controller sets.
-
-    Raises:
-        ArgumentError: if there is none of that name, or its numbers do not reach the step as they are.
-    """
+    """The parameter of a system that a controller sets."""
     inputs, parameters = system.given_inputs(), system.arguments()
     direct = {each: row for each, (row, least) in system.direct().items() if least == checks.ANY}
     if name in inputs:

@@ -126,11 +126,7 @@ def names_of(methods: Iterable[Named]) -> Names:
 
 
 def resolved(name: str, methods: dict[str, M]) -> M:
-    """The method of any name but its own.
-
-    Raises:
-        UnknownNameError: if several methods have that name, if stepwell does not have that method, or if there is none.
-    """
+    """The method of any name but its own."""
     names, key = _names(tuple(methods.values())), spelling(name[:MAX_LENGTH])
     shown = short(name)
     holders = names.methods.get(key, [])

@@ -173,11 +173,7 @@ def _grows(programs: Programs) -> bool:
 
 
 def order_of(name: str, programs: Programs) -> tuple[int, int | None, bool]:
-    """The order of a method, that of its estimate, and whether it has its order only for ÿ = a(t, y).
-
-    Raises:
-        UnsupportedError: if its error does not become smaller with the step.
-    """
+    """The order of a method, that of its estimate, and whether it has its order only for ÿ = a(t, y)."""
     asks = any(each[0] == "velocity" for each in (*programs.whole.operations, *(programs.begin or Program((), ())).operations))
     general = (0, 0, 0) if asks else _errors(programs, acceleration=False)
     special = _errors(programs, acceleration=True)

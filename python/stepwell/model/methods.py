@@ -264,11 +264,7 @@ def for_stiff(tolerance: float) -> Method | None:
 
 
 def choice(methods: Any) -> list[Method]:
-    """The methods named by an argument ``methods``, each once; all if None.
-
-    Raises:
-        ArgumentError: if it is not a list of methods, or is empty.
-    """
+    """The methods named by an argument ``methods``, each once; all if None."""
     chosen = list(_catalogue().values()) if methods is None else checks.several("methods", methods, "names")
     if not chosen:
         raise ArgumentError("methods: expected at least one, got none")
@@ -276,12 +272,7 @@ def choice(methods: Any) -> list[Method]:
 
 
 def of_operations(name: str | Method) -> Method:
-    """The method of that name, where its step must consist of operations.
-
-    Raises:
-        UnsupportedError: if it is "exact".
-        UnknownNameError: if there is no such method.
-    """
+    """The method of that name, where its step must consist of operations."""
     chosen = method(name)
     if chosen.is_exact:
         raise UnsupportedError(NO_OPERATIONS)

@@ -29,9 +29,6 @@ def from_axis_angle(axis: Any, angle: Any) -> Array:
     Returns:
         Unit quaternions, shape (4, …).
 
-    Raises:
-        ArgumentError: if an argument is wrong.
-
     Example:
         >>> sw.quaternion.from_axis_angle([0.0, 0.0, 1.0], 0.5 * np.pi)  # a quarter of a turn about the third axis
         array([0.70710678, 0.        , 0.        , 0.70710678])
@@ -66,9 +63,6 @@ def product(p: Any, q: Any) -> Array:
     Returns:
         Quaternions, shape (4, …).
 
-    Raises:
-        ArgumentError: if an argument is wrong.
-
     Example:
         >>> quarter = sw.quaternion.from_axis_angle([0.0, 0.0, 1.0], 0.5 * np.pi)
         >>> sw.quaternion.product(quarter, quarter).round(12)  # half a turn about the third axis
@@ -98,9 +92,6 @@ def matrix(q: Any) -> Array:
 
     Returns:
         Matrices, shape (3, 3, …).
-
-    Raises:
-        ArgumentError: what is wrong with ``q``.
 
     Example:
         >>> quarter = sw.quaternion.from_axis_angle([0.0, 0.0, 1.0], 0.5 * np.pi)

@@ -67,9 +67,6 @@ class Scene(ValueEquality):
     Two scenes are equal if all of these are. A scene can be pickled and copied if its ``exact`` can: those of the built-in scenes
     can, a lambda cannot.
 
-    Raises:
-        ArgumentError: what was given and what was expected.
-
     Example:
         >>> scene = Scene(sw.Pendulum(), v=0.0, y=2.0, horizon=20.0)
         >>> sw.advise(scene, frame=None, tolerance=1e-3, methods=["leapfrog", "rk4"], cost="evaluations")
@@ -153,7 +150,6 @@ class Scene(ValueEquality):
             A ``Run`` with blocks of shape (saved, *block).
 
         Raises:
-            ArgumentError: what was given and what was expected.
             UnsupportedError: if the method cannot step the system.
 
         Warns:
@@ -192,7 +188,6 @@ class Scene(ValueEquality):
             The page, an ``Explorer``, which can also be saved; see ``stepwell.explore``.
 
         Raises:
-            ArgumentError: what was given and what was expected.
             UnsupportedError: if no method steps the scene, or its steps are too long for a page.
         """
         show = checks.flag("show", show)
@@ -308,7 +303,6 @@ class Scene(ValueEquality):
 
     @cached_property
     def _groups(self) -> tuple[Whole, Whole]:
-        """The group of each number of v and of y."""
         groups = np.asarray(self.system.groups, dtype=np.int64)
         return groups[: self.v.size], groups[self.v.size :]
 
@@ -379,7 +373,6 @@ class Scene(ValueEquality):
             return self.system.energy(np.moveaxis(v, 0, -1), np.moveaxis(y, 0, -1))
 
     def _repr_html_(self) -> str:
-        """A table for notebooks."""
         return facts(
             f"{self.title} ({self.name})",
             [

@@ -57,13 +57,9 @@ def tabled(exact: Exact, until: float, scales: tuple[Array, Array], close: float
 
 
 class Table(ValueEquality):
-    """A motion by a table: a polynomial over each interval.
+    """A motion by a table: a polynomial over each interval; they begin at ``starts``, ascending.
 
-    Args:
-        starts: the times at which the intervals begin, ascending.
-        lengths: their lengths.
-        tables: the values of v and of y at the nodes, shape (nodes, numbers of the block, intervals).
-        shapes: the shapes of the blocks.
+    ``tables`` are the values of v and of y at the nodes, shape (nodes, numbers of the block, intervals).
     """
 
     def __init__(self, starts: Array, lengths: Array, tables: list[Array], shapes: list[Shape]) -> None:

@@ -49,11 +49,7 @@ Mask = np.ndarray[Any, np.dtype[np.bool_]]
 class Tight:
     """The run of a scene to a tight tolerance, as a function of time; it does not depend on the times of earlier calls.
 
-    Args:
-        scene: the scene, whose control is left out.
-        tolerance: the tolerance of the run.
-        part: its longest step, as a part of that of the reference.
-        method: the method.
+    The scene's control is left out; the longest step is this ``part`` of that of the reference.
     """
 
     def __init__(self, scene: Scene, tolerance: float = TIGHT_TOLERANCE, part: float = 1.0, method: str = METHOD) -> None:
@@ -93,7 +89,6 @@ class Tight:
         self._places.append((time, state, on))
 
     def _fresh(self, time: float, state: tuple[Array, Array], tolerance: float) -> dict[str, Any]:
-        """The arguments of a run that starts from this state."""
         return {"v": state[0], "y": state[1], "t0": time, "tolerance": tolerance} | self._options
 
     def _part(self, at: Array, i: int) -> tuple[Run, bool]:

@@ -10,14 +10,6 @@ from .margins import Margins, frequency_response, margins
 from .systems import DiscreteSystem, SampledRun, discretise
 
 __all__ = [
-    "DiscreteSystem",
-    "LinearisedLoop",
-    "Margins",
-    "SampledRun",
-    "discretise",
-    "frequency_response",
-    "linearised_loop",
-    "margins",
-    "sampled_loop",
-    "sampling_limit",
-]
+    "DiscreteSystem", "LinearisedLoop", "Margins", "SampledRun", "discretise", "frequency_response", "linearised_loop", "margins",
+    "sampled_loop", "sampling_limit",
+]  # fmt: skip

@@ -133,9 +133,6 @@ def sampling_limit(plant: Any, controller: Any, *, delay: float = 0.0, samples: 
         The limit in units of time: 0 if the loop is not stable with the shortest samples, a thousandth of the shortest time
         constant and 0.003 of the dead time; infinity if it is with samples of a thousand times the longest time constant.
 
-    Raises:
-        ArgumentError: if an argument is wrong.
-
     Example:
         >>> integrator = sw.TransferFunction(1.0, [1.0, 0.0])
         >>> round(sw.sampling_limit(integrator, 4.0), 9)  # 1 − 4·dt leaves the circle at −1
@@ -199,7 +196,6 @@ def sampling_limit(plant: Any, controller: Any, *, delay: float = 0.0, samples: 
 
 
 def _corners(plant: LinearSystem, controller: Any) -> Any:
-    """The corners of the loop of continuous time."""
     part = part_of("plant", plant, of_states=True)
     other = of_gain("controller", controller, 1, 1) if is_gain(controller) else part_of("controller", controller, of_states=True)
     try:

@@ -41,15 +41,10 @@ def scaled(system: LinearSystem, dts: Array) -> LinearSystem:
 def grow(
     plant: LinearSystem, controller: Callable[[Array], Realisation], dts: Array, delay: float, samples: int, slack: Array
 ) -> Truths:
-    """True for each loop that has an eigenvalue larger than 1 by more than the slack.
+    """True for each loop, shape (members,), that has an eigenvalue larger than 1 by more than its slack.
 
-    Args:
-        plant: as for ``sampled_loop``.
-        controller: from lengths of a sample to what is done in each.
-        dts: the lengths of a sample, shape (members,).
-        delay: dead time in units of time.
-        samples: further dead time in samples.
-        slack: shape (members,).
+    The plant is as for ``sampled_loop``; ``controller`` leads from lengths of a sample to what is done in each. ``delay`` is dead
+    time in units of time, ``samples`` further dead time in samples.
     """
     late = [samples_of(delay + samples * dt, dt) for dt in dts.tolist()]
     wholes, rests = np.array([each[0] for each in late]), np.array([each[1] for each in late])

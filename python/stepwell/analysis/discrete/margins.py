@@ -39,9 +39,6 @@ def frequency_response(system: Any, omega: Any) -> Complex:
     Returns:
         Complex numbers, shape (*frequencies, *batch); of several inputs or outputs (*frequencies, r, m, *batch).
 
-    Raises:
-        ArgumentError: if an argument is wrong.
-
     Example:
         >>> lag = sw.TransferFunction(1.0, [1.0, 1.0])
         >>> sw.frequency_response(lag, 1.0).round(6)
@@ -89,9 +86,6 @@ def margins(loop: Any, *, delay: float = 0.0) -> Margins:
     Args:
         loop: a linear system, from the sum to where the feedback is taken; or a ``DiscreteSystem``, seen up to π/dt.
         delay: dead time in the loop, in units of time; that of a ``DiscreteSystem`` is an argument of ``discretise``.
-
-    Returns:
-        The ``Margins``.
 
     Raises:
         ArgumentError: if it is no such system, or has several inputs, outputs or members.

@@ -150,7 +150,6 @@ class DiscreteSystem(ValueEquality):
         return replace(self, Q=product_of(self.Q, gain), Q_next=product_of(self.Q_next, gain), D=product_of(self.D, gain))
 
     def __rmul__(self, gain: Any) -> Any:
-        """The outputs times a number."""
         if not is_gain(gain):
             return self._with(gain, series)
         gain = of_gain("gain", gain, len(self.D), len(self.D)).D
@@ -165,15 +164,12 @@ class DiscreteSystem(ValueEquality):
     __radd__ = __add__
 
     def __sub__(self, other: Any) -> Any:
-        """Common inputs, and the difference of the outputs."""
         return self + -1.0 * other if isinstance(other, DiscreteSystem) or is_gain(other) else self._with(other, parallel)
 
     def __rsub__(self, gain: Any) -> Any:
-        """A gain less this system."""
         return -1.0 * self + gain
 
     def __neg__(self) -> Any:
-        """The outputs with the other sign."""
         return -1.0 * self
 
     def _with(self, other: Any, join: Callable[[Realisation, Realisation], Realisation]) -> Any:
@@ -198,9 +194,6 @@ class DiscreteSystem(ValueEquality):
 
         Returns:
             Complex numbers, shape (*frequencies, *batch); of several inputs or outputs (*frequencies, r, m, *batch).
-
-        Raises:
-            ArgumentError: if ``omega`` is no such array.
         """
         omega = checks.numbers("omega", omega, unit="rad per unit of time")
         z = np.exp(1j * self.dt * omega)
@@ -217,9 +210,6 @@ class DiscreteSystem(ValueEquality):
 
         Returns:
             A ``SampledRun`` of as many samples.
-
-        Raises:
-            ArgumentError: if an argument has a wrong shape.
         """
         samples, (n, m) = checks.numbers("x", x), self.Q.shape[:2]
         if m == 1 and samples.ndim:
@@ -299,11 +289,7 @@ def discretise(
             multiple of dt: in an exact step the input then changes within the step, once. The samples that are under way are
             states behind those of the system, the newest first.
 
-    Returns:
-        A ``DiscreteSystem``.
-
     Raises:
-        ArgumentError: if an argument is wrong.
         UnsupportedError: if the system is not linear, or the method cannot step it.
 
     Example:

@@ -74,7 +74,6 @@ class Jacobian(ValueEquality):
         return by_growth(self.matrix)
 
     def _repr_html_(self) -> str:
-        """The matrix of one member and its eigenvalues, as a table for notebooks."""
         if self.matrix.ndim > 2:
             return facts(
                 "Jacobian",
@@ -109,7 +108,6 @@ def jacobian(system: System, *, y: Any, v: Any = None, t: float = 0.0) -> Jacobi
         A ``Jacobian``: ``matrix`` of shape (n, n, *members), and its blocks ``vv``, ``vy``, ``yv`` and ``yy``.
 
     Raises:
-        ArgumentError: what was given and what was expected.
         UnsupportedError: if the rates depend on the state through an operation that has no derivative.
 
     Example:

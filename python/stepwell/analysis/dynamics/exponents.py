@@ -167,7 +167,6 @@ def lyapunov(
         ``Lyapunov``: ``exponents`` of shape (k, *batch), and their history.
 
     Raises:
-        ArgumentError: what was given and what was expected.
         UnsupportedError: if the method cannot step the system, a step has no derivative, or its derivative is too long.
 
     Warns:
@@ -497,7 +496,6 @@ def _not_too_long(system: System, method: Method, members: tuple[int, ...], dt: 
 
 
 def _how_many(exponents: Any, n: int) -> int:
-    """The number of exponents, from a number or "all"."""
     if isinstance(exponents, str):
         checks.known("exponents", exponents, ("all",))
         return n
@@ -554,7 +552,6 @@ def _log(x: Any) -> Any:
 
 
 def _warn(exponents: Array) -> None:
-    """Warn if some members have no exponents."""
     lost = np.isnan(exponents).any(axis=0)
     if lost.any():
         some = int(lost.sum())

@@ -181,7 +181,6 @@ def equilibria(
         ``Equilibria``: a sequence. It lacks equilibria that no start reaches, and their number is unknown.
 
     Raises:
-        ArgumentError: what was given and what was expected.
         UnsupportedError: if the rates depend on the state through an operation that has no derivative, or the method cannot step
             the system.
 

@@ -74,14 +74,10 @@ def _changes(weights: Array, columns: Array, share: Any) -> Any:
 
 
 def constant_sums(system: System, starts: Array, t: float) -> Sums:
-    """The linear sums that are constant in every motion of a system, from its rates at random places.
+    """The linear sums that are constant in every motion of a system of one member, from its rates at random places.
 
-    Momenta are left out where ẏ = v: they are zero at rest, whatever the start has.
-
-    Args:
-        system: of one member.
-        starts: states to draw places near, shape (n, starts).
-        t: the time.
+    The places are near ``starts``, shape (n, starts). Momenta are left out where ẏ = v: they are zero at rest, whatever the start
+    has.
     """
     n, (n_v, _) = len(starts), maps.size(system)
     size, drawn = np.abs(starts).max(axis=1), np.random.default_rng(n)

@@ -10,16 +10,6 @@ from .kepler import eccentric_anomaly
 from .units import gravity
 
 __all__ = [
-    "Elements",
-    "Start",
-    "corrected",
-    "eccentric_anomaly",
-    "elements",
-    "gravity",
-    "inertial",
-    "jacobi",
-    "of_state",
-    "state",
-    "system",
-    "uncorrected",
-]
+    "Elements", "Start", "corrected", "eccentric_anomaly", "elements", "gravity", "inertial", "jacobi", "of_state", "state",
+    "system", "uncorrected",
+]  # fmt: skip

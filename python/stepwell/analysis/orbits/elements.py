@@ -164,9 +164,6 @@ def of_state(mu: Any, v: Any, y: Any, *, t: Any = 0.0) -> Elements:
     Returns:
         The elements, shape (*batch).
 
-    Raises:
-        ArgumentError: if an argument is wrong.
-
     Example:
         >>> orbit = sw.orbits.of_state(1.0, v=[0.0, 1.2], y=[1.0, 0.0])
         >>> float(orbit.e.round(12)), float(orbit.apoapsis.round(6))
@@ -252,7 +249,6 @@ def _placed(mu: Array, t: Array, dim: int, read: dict[str, Array]) -> Blocks:
 
 
 def _sizes(mu: Array, e: Array, read: dict[str, Array]) -> Blocks:
-    """The semi-major axis and the distance of the periapsis."""
     if "periapsis" in read:
         q = read["periapsis"]
         with np.errstate(divide="ignore"):

@@ -184,7 +184,6 @@ def elements(of: Any, v: Any = None, y: Any = None, *, t: Any = 0.0, around: Any
         are NaN.
 
     Raises:
-        ArgumentError: if an argument is wrong.
         UnsupportedError: if the force is another one, which has no such orbits.
 
     Example:
@@ -223,9 +222,6 @@ def jacobi(masses: Any, block: Any) -> Array:
     Returns:
         The block of the same shape.
 
-    Raises:
-        ArgumentError: if an argument is wrong.
-
     Example:
         >>> sw.orbits.jacobi([1.0, 1.0, 1.0], [[0.0, 0.0], [1.0, 0.0], [2.0, 0.0]])
         array([[1. , 0. ],
@@ -251,9 +247,6 @@ def inertial(masses: Any, block: Any) -> Array:
 
     Returns:
         The block of the same shape.
-
-    Raises:
-        ArgumentError: if an argument is wrong.
 
     Example:
         >>> sw.orbits.inertial([1.0, 1.0, 1.0], [[1.0, 0.0], [1.0, 0.0], [1.5, 0.0]])
@@ -356,7 +349,6 @@ class _Before:
 
 
 def _centre(masses: Array, rows: Any, members: Sequence[int]) -> Array:
-    """The centre of mass; of bodies without mass, their mean."""
     if len(members) == 1:
         return np.asarray(rows[members[0]])
     total = masses[members].sum(axis=0)

@@ -14,22 +14,7 @@ from .function import StabilityFunction, function
 from .limit import Mode, StabilityLimit, StabilityLimits, stability_limit
 
 __all__ = [
-    "KINDS",
-    "Analysis",
-    "Criteria",
-    "Criterion",
-    "Mode",
-    "Operations",
-    "Series",
-    "StabilityAlong",
-    "StabilityFunction",
-    "StabilityLimit",
-    "StabilityLimits",
-    "analyse",
-    "criteria",
-    "function",
-    "operations",
-    "series",
-    "stability_along",
+    "KINDS", "Analysis", "Criteria", "Criterion", "Mode", "Operations", "Series", "StabilityAlong", "StabilityFunction",
+    "StabilityLimit", "StabilityLimits", "analyse", "criteria", "function", "operations", "series", "stability_along",
     "stability_limit",
-]
+]  # fmt: skip

@@ -27,7 +27,7 @@ from .analysis import goes_forward
 from .eigen import Complex
 from .limit import Mode, stability_limit
 from .limit_digits import LADDER
-from .limit_search import ELEMENTS_AT_ONCE, GROWTH_EXPONENT, NEVER_STABLE_STEP, PAST_LIMIT, Search
+from .limit_search import ELEMENTS_AT_ONCE, GROWTH_EXPONENT, NEVER_STABLE_STEP, PAST_LIMIT, Search, mode_of
 from .parts import function_of_rates
 
 #: A real part below the first fraction of a state's fastest rate counts as zero, and a rate below the second does, too.
@@ -84,7 +84,6 @@ class StabilityAlong(ValueEquality):
         return self.run_dt > self.limits
 
     def _repr_html_(self) -> str:
-        """The smallest limit and where it is set, as a table for notebooks."""
         pairs: list[tuple[str, Any]] = [("method", self.method.title), ("step of the run", cell(self.run_dt))]
         if self.limits.ndim > 1:
             return facts(
@@ -125,7 +124,6 @@ def stability_along(run: Run, method: str | Method | None = None) -> StabilityAl
         A ``StabilityAlong``: ``dt``, ``index``, ``when`` and ``mode``, and ``limits`` of every state.
 
     Raises:
-        ArgumentError: what was given and what was expected.
         UnsupportedError: if the method cannot do the system, or its rates have no derivative.
 
     Example:
@@ -327,8 +325,7 @@ class _Trials:
 
 def _mode(system: System, method: Method, A: Array, limit: float, rate: complex) -> Mode:
     """The mode that becomes unstable at the limit of a state, from the matrix of its linearised rates."""
-    n_v, n = maps.size(system)[0], len(A)
-    linear = LinearSystem(A, velocities=n_v)
+    linear = LinearSystem(A, velocities=maps.size(system)[0])
     past = limit * (1.0 + PAST_LIMIT) if limit else NEVER_STABLE_STEP / abs(rate)
     true = eigen.eigen(A)
     dt = np.array([past])
@@ -344,14 +341,4 @@ def _mode(system: System, method: Method, A: Array, limit: float, rate: complex)
     crossing = on[np.abs(on - leaving).argmin()]
     if own.imag < 0.0:
         leaving, shape, own, crossing = leaving.conj(), shape.conj(), own.conj(), crossing.conj()
-    crossing = crossing / abs(crossing)
-    shape = shape / shape[np.abs(shape).argmax()]
-    turns = leaving.imag != 0.0 or leaving.real < 0.0
-    return Mode(
-        eigenvalue=complex(crossing),
-        angle=float(abs(np.angle(crossing))),
-        rate=complex(own),
-        kind="unstable oscillation" if turns else "monotonic unstable",
-        v=shape[:n_v].reshape(system.v_shape),
-        y=shape[n_v:n].reshape(system.y_shape),
-    )
+    return mode_of(system, crossing, own, shape, leaving)

@@ -196,7 +196,6 @@ class Analysis(ValueEquality):
             The figure; a notebook shows it.
 
         Raises:
-            ArgumentError: if there is no such format.
             UnsupportedError: if matplotlib is missing.
 
         Example:
@@ -258,7 +257,6 @@ def analyse(
         An ``Analysis``; numbers for one member, arrays of the shape of the members otherwise.
 
     Raises:
-        ArgumentError: what was given and what was expected.
         UnsupportedError: if the method cannot step the system.
 
     Example:
@@ -354,7 +352,6 @@ def goes_forward(run: Run) -> None:
 
 
 def _along(system: System, method: Method, dt: Array, run: Run) -> Analysis:
-    """The analysis at every saved state of a run."""
     goes_forward(run)
     if run.t.ndim > 1:
         raise UnsupportedError("at: expected a run whose members have their times in common; analyse a run for each t0")

@@ -59,9 +59,7 @@ decimals: Any = np.frompyfunc(
 def eigenvalues(matrix: Any, near: Complex) -> Complex:
     """The eigenvalues of one matrix, shape (n,), right to double precision; a pair has its positive angle first.
 
-    Args:
-        matrix: floats, or decimals, shape (n, n).
-        near: the eigenvalues as computed in double precision, shape (n,).
+    The matrix has floats or decimals; ``near`` are the eigenvalues as computed in double precision.
     """
     with localcontext(context(digits(matrix))):
         elements = matrix.copy() if matrix.dtype == object else decimals(matrix)
@@ -82,13 +80,7 @@ def unrounded(rates: Array, velocities: int, method: Method) -> tuple[Any, int]:
 
 
 class Step:
-    """A step of ṡ = A·s in as many digits as needed.
-
-    Args:
-        rates: A in the order (v, y), shape (n, n).
-        velocities: how many of the states are velocities.
-        method: the method.
-    """
+    """A step of ṡ = A·s in as many digits as needed; the rates A are in the order (v, y), with so many velocities."""
 
     def __init__(self, rates: Array, velocities: int, method: Method) -> None:
         P, self.clock = unrounded(rates, velocities, method)

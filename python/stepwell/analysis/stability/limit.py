@@ -76,7 +76,6 @@ def stability_limit(system: System, method: str | Method, *, at: Any = None, t: 
         derivatives of the rates are not finite.
 
     Raises:
-        ArgumentError: what was given and what was expected.
         UnsupportedError: if the method cannot step the system, or a nonlinear system comes without a state.
 
     Warns:
@@ -228,7 +227,6 @@ def _shaped(system: System, mode: Mode | None) -> Mode | None:
 
 
 def _warn(system: System, method: Method, limit: Any) -> None:
-    """Warn of limits that are NaN because they are not decided."""
     doubtful = np.atleast_1d(~np.asarray(limit.decided))
     stable, grows = (np.atleast_1d(each)[doubtful][0] for each in (limit.stable, limit.grows))
     one = isinstance(limit, StabilityLimit)

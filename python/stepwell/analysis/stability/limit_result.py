@@ -73,7 +73,6 @@ class StabilityLimit(float):
     __str__ = __repr__
 
     def _repr_html_(self) -> str:
-        """The limit and the mode that grows beyond it, as a table for notebooks."""
         mode = self.mode
         return facts(
             "Stability limit",

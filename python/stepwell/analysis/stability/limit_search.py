@@ -420,7 +420,7 @@ class Search:
             if rate.imag < 0.0:  # of a pair, the one that turns forwards
                 rate, shape, crossing, leaving = rate.conj(), shape.conj(), crossing.conj(), leaving.conj()
             left[index] = leaving
-            modes[index] = self._mode(crossing, rate, shape, leaving, bool(self.grows_by_itself[index]))
+            modes[index] = mode_of(self.system, crossing, rate, shape, leaving, by_itself=bool(self.grows_by_itself[index]))
         return modes, left
 
     def lift(self, modes: Any, steps: Array, past: Complex) -> None:
@@ -443,19 +443,23 @@ class Search:
             v, y = shape[:n_v].reshape(self.system.v_shape), shape[n_v:].reshape(self.system.y_shape)
             modes[index] = mode._replace(v=v, y=y)
 
-    def _mode(self, crossing: complex, rate: complex, shape: Complex, leaving: complex, by_itself: bool) -> Mode:
-        n_v = maps.size(self.system)[0]
-        shape = shape / shape[np.abs(shape).argmax()]
-        crossing = crossing / abs(crossing)
-        kind = "unstable oscillation" if leaving.imag != 0.0 or leaving.real < 0.0 else "monotonic unstable"
-        return Mode(
-            eigenvalue=complex(crossing),
-            angle=float(abs(np.angle(crossing))),
-            rate=complex(rate),
-            kind=f"{kind} of the exact solution too" if by_itself else kind,
-            v=shape[:n_v].reshape(self.system.v_shape),
-            y=shape[n_v:].reshape(self.system.y_shape),
-        )
+
+def mode_of(
+    system: System, crossing: complex, rate: complex, shape: Complex, leaving: complex, *, by_itself: bool = False
+) -> Mode:
+    """The mode with this rate and shape, whose eigenvalue crosses the unit circle there and is ``leaving`` a little past it."""
+    n_v = maps.size(system)[0]
+    shape = shape / shape[np.abs(shape).argmax()]
+    crossing = crossing / abs(crossing)
+    kind = "unstable oscillation" if leaving.imag != 0.0 or leaving.real < 0.0 else "monotonic unstable"
+    return Mode(
+        eigenvalue=complex(crossing),
+        angle=float(abs(np.angle(crossing))),
+        rate=complex(rate),
+        kind=f"{kind} of the exact solution too" if by_itself else kind,
+        v=shape[:n_v].reshape(system.v_shape),
+        y=shape[n_v:].reshape(system.y_shape),
+    )
 
 
 #: The result of ``growth`` for members that are not sought: on the circle, with any tolerance, without doubt.

@@ -99,13 +99,7 @@ def _by_rounding(matrix: Array, values: Complex, spectrum: eigen.Eigen) -> Array
 
 
 def parts(matrix: Array, velocities: int, method: Method) -> list[Part]:
-    """The parts of ṡ = A·s: their steps have all eigenvalues of its step, except those that are always 1.
-
-    Args:
-        matrix: A in the order (v, y), shape (n, n).
-        velocities: how many of the states are velocities.
-        method: the method.
-    """
+    """The parts of ṡ = A·s, A in the order (v, y): their steps have all eigenvalues of its step but those that are always 1."""
     decomposed: list[Part] = []
     for states in components(matrix):
         part = Part(matrix[np.ix_(states, states)], int((states < velocities).sum()))
@@ -135,14 +129,7 @@ def components(matrix: Array) -> list[np.ndarray[Any, np.dtype[np.intp]]]:
 
 
 def spectra(matrix: Array, velocities: int, method: Method, dt: Array) -> tuple[Complex, Complex]:
-    """The eigenvalues of steps, computed by parts, and the rates that they continue, both of shape (n, steps).
-
-    Args:
-        matrix: A in the order (v, y), shape (n, n).
-        velocities: how many of the states are velocities.
-        method: the method.
-        dt: the steps, shape (steps,).
-    """
+    """The eigenvalues of steps ``dt`` of ṡ = A·s, by parts, and the rates that they continue, both of shape (n, steps)."""
     z, exactly = np.ones((len(matrix), len(dt)), dtype=np.complex128), np.zeros((len(matrix), len(dt)), dtype=np.complex128)
     k = 0  # states that are in no part are constant: z = 1
     for part in parts(matrix, velocities, method):

@@ -20,17 +20,9 @@ from .pendulum import PendulumEnv, PendulumVectorEnv  # noqa: E402
 from .traced import TracedVectorEnv  # noqa: E402
 
 __all__ = [
-    "CartPoleEnv",
-    "CartPoleVectorEnv",
-    "DoubleRodEnv",
-    "DoubleRodVectorEnv",
-    "PendulumEnv",
-    "PendulumVectorEnv",
-    "TracedVectorEnv",
-    "WorldEnv",
-    "WorldVectorEnv",
-    "cart_pole",
-]
+    "CartPoleEnv", "CartPoleVectorEnv", "DoubleRodEnv", "DoubleRodVectorEnv", "PendulumEnv", "PendulumVectorEnv",
+    "TracedVectorEnv", "WorldEnv", "WorldVectorEnv", "cart_pole",
+]  # fmt: skip
 
 for _name, _kind in (("CartPole", CartPoleEnv), ("DoubleRod", DoubleRodEnv), ("Pendulum", PendulumEnv)):
     gymnasium.register(

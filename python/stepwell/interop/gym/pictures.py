@@ -33,11 +33,7 @@ class Line(NamedTuple):
 
 
 class Camera:
-    """Draws sketches of one view, each as a frame of its own.
-
-    Args:
-        view: left, right, bottom and top of what is seen.
-    """
+    """Draws sketches of one view (left, right, bottom and top of what is seen), each as a frame of its own."""
 
     def __init__(self, view: tuple[float, float, float, float]) -> None:
         self._figure = new_figure(*SIZE, dpi=DPI)

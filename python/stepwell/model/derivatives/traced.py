@@ -54,15 +54,9 @@ class _Placed:
 
 
 class Traced:
-    """Values that depend on a system's state, on a tape of their own; ``places`` are those of its numbers on the tape, v first.
+    """Values that depend on a system's state, on a tape of their own, with the functions marked on it.
 
-    Attributes:
-        system: the system.
-        tape: the tape of all values.
-        marks: the functions on it.
-        state: the symbols of a member's numbers, v first.
-        roots: the symbols of the values.
-        length: how many numbers a state has.
+    ``state`` has the symbols of a member's numbers, v first, at ``places`` of the tape; ``roots`` are those of the values.
     """
 
     def __init__(self, system: System, what: str, method: Method | None = None, places: Sequence[int] | None = None) -> None:

@@ -127,9 +127,6 @@ class Definition:
                 it may take the time before the state, as the rates do, but not depend on it. Parameters are those of the system,
                 by name. ``run.energy`` is the invariant called ``energy``.
 
-        Returns:
-            The function.
-
         Raises:
             ArgumentError: if the system has no such parameter.
 
@@ -164,9 +161,6 @@ class Definition:
             of: ``"component"`` for friction on each number of v; ``"row"`` for friction against the direction of vectors, which
                 are along the last axis of v, as of bodies on a table.
             component: the place of the only number of v that has friction: an index, or a tuple of them.
-
-        Returns:
-            The function.
 
         Raises:
             ArgumentError: if the system is of first order, has friction already, or has no such parameter.
@@ -316,7 +310,6 @@ def system(
         A ``Definition``: called with parameters by name, it returns a ``System``.
 
     Raises:
-        ArgumentError: what is wrong with the function's arguments.
         TraceError: at the first use with a state, if the function does what cannot be traced; the message names the line.
 
     Example:

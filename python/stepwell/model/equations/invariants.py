@@ -48,13 +48,7 @@ def invariant(system: str, state: tuple[str, ...], parameters: Collection[str], 
 
 
 class Traced:
-    """An invariant of a system of known shapes: its value and its gradient as operations.
-
-    Args:
-        invariant: the invariant.
-        equations: the system.
-        single: whether the operations are those of float32.
-    """
+    """An invariant of a system of known shapes: its value and its gradient as operations, of float32 if ``single``."""
 
     def __init__(self, invariant: Invariant, equations: TracedFunction, *, single: bool = False) -> None:
         self.invariant, self.equations = invariant, equations

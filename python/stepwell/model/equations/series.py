@@ -59,11 +59,6 @@ class MarkedReplay(Replay):
     """The operations of values on a tape, repeated for other operands, with the functions among them marked.
 
     On series a function follows its own rule, since roundings and operations on bits have none; on symbols its value is marked.
-
-    Args:
-        tape: the tape of the values.
-        values: the values.
-        marks: the marked functions.
     """
 
     def __init__(self, tape: Any, values: Sequence[Any], marks: Marks) -> None:
@@ -167,10 +162,7 @@ class TracedFunction(Protocol):
 class OnSeries:
     """The operations of a user's function of the time and the state, carried out on series.
 
-    Args:
-        equations: the system.
-        function: of the time, both blocks and parameters by name; it returns blocks, and None for one that is not there.
-        values: the parameters by name.
+    ``function`` takes the time, both blocks and parameters by name; it returns blocks, and None for one that is not there.
     """
 
     def __init__(self, equations: TracedFunction, function: Callable[..., Sequence[Any]], values: dict[str, Any]) -> None:

@@ -48,7 +48,6 @@ def value_of(x: Any) -> Any:
 
 
 def _mask(x: Any) -> Any:
-    """The value of a comparison."""
     if isinstance(x, Truth):
         return x.value
     if isinstance(x, (bool, np.bool_)):

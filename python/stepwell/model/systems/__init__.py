@@ -23,22 +23,9 @@ if TYPE_CHECKING:
     from .aircraft import Aircraft
 
 __all__ = [
-    "Aircraft",
-    "Chain",
-    "LinearSystem",
-    "NBody",
-    "Oscillator",
-    "Particles",
-    "Pendulum",
-    "Pendulum3D",
-    "RestrictedThreeBody",
-    "RigidBody",
-    "Rods",
-    "Sampled",
-    "Sinusoid",
-    "Springs",
-    "System",
-]
+    "Aircraft", "Chain", "LinearSystem", "NBody", "Oscillator", "Particles", "Pendulum", "Pendulum3D", "RestrictedThreeBody",
+    "RigidBody", "Rods", "Sampled", "Sinusoid", "Springs", "System",
+]  # fmt: skip
 
 
 def __getattr__(name: str) -> Any:

@@ -32,14 +32,8 @@ def wrapped(angle: Any) -> Any:
 def torques(v: Any, angles: Any, bank: Any, damping: Any, gains: Any, commands: Any, added: Any) -> list[Any]:
     """The torques of the dampers, of the yaw rate by the roll angle, and of the commands that are given.
 
-    Args:
-        v: the angular velocity.
-        angles: roll and pitch in degrees, as the controllers take them.
-        bank: sin φ·cos θ.
-        damping: the dampers of the three axes.
-        gains: the gains of roll, pitch and yaw rate.
-        commands: the commanded roll and pitch.
-        added: the torque commands about the three axes.
+    ``angles`` are roll and pitch in degrees, as the controllers take them, ``bank`` is sin φ·cos θ. The gains are those of roll,
+    pitch and yaw rate, the commands are for roll and pitch, and those ``added`` for torques about the three axes.
     """
     along = [-damping[axis] * v[axis] for axis in range(3)]
     along[2] = along[2] - gains[2] * bank

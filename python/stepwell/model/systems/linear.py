@@ -51,9 +51,6 @@ class LinearSystem(System):
         second_order: whether ẏ is v times a number, so that Verlet can step it if no row of v depends on v.
         input_names: ``("x",)`` for one input, ``("x[0]", "x[1]", …)`` for several.
 
-    Raises:
-        ArgumentError: if an argument is wrong.
-
     Example:
         >>> mass = sw.LinearSystem([[-0.2, -4.0], [1.0, 0.0]], B=[1.0, 0.0], x=1.0)  # states: velocity, position
         >>> run = sw.integrate(mass, "rk4", v=0.0, y=0.0, dt=0.05, steps=2000)
@@ -162,7 +159,6 @@ class LinearSystem(System):
         return joined(series(gain._replace(x=own.x), own._replace(x=gain.x)))
 
     def __rmul__(self, gain: Any) -> LinearSystem:
-        """The outputs times a number."""
         if not is_gain(gain):
             return NotImplemented
         from .realisation import of_gain, series  # only joined systems need it
@@ -182,15 +178,12 @@ class LinearSystem(System):
     __radd__ = __add__
 
     def __sub__(self, other: Any) -> LinearSystem:
-        """Common inputs, and the difference of the outputs."""
         return self + -1.0 * other if isinstance(other, LinearSystem) or is_gain(other) else NotImplemented
 
     def __rsub__(self, other: Any) -> LinearSystem:
-        """A gain less this system."""
         return -1.0 * self + other if is_gain(other) else NotImplemented
 
     def __neg__(self) -> LinearSystem:
-        """The outputs with the other sign."""
         return -1.0 * self
 
     def repr_arguments(self) -> list[str]:
@@ -269,20 +262,12 @@ class LinearSystem(System):
         return f"B[{order[row]},{self._columns()[column - len(order)]}]"
 
     def split(self, state: Any) -> tuple[Array, Array]:
-        """The blocks (v, y) of a state in the order of A, shape (n, *batch).
-
-        Raises:
-            ArgumentError: if the state is wrong.
-        """
+        """The blocks (v, y) of a state in the order of A, shape (n, *batch)."""
         array = checks.block("state", state, (len(self.A),), self.axes)
         return array[list(self.velocities)], array[list(self.coordinates)]
 
     def state(self, v: Any, y: Any) -> Array:
-        """The state in the order of A, shape (n, *batch), of the blocks v and y: undoes ``split``.
-
-        Raises:
-            ArgumentError: if a block is wrong.
-        """
+        """The state in the order of A, shape (n, *batch), of the blocks v and y: undoes ``split``."""
         v = checks.block("v", v, self.v_shape, self.axes, finite=False)
         y = checks.block("y", y, self.y_shape, self.axes, finite=False)
         batch = checks.batch_shape({"v": v.shape[1:], "y": y.shape[1:]})
@@ -312,11 +297,7 @@ class LinearSystem(System):
 
 
 def realised(system: LinearSystem, argument: str = "system", *, of_states: bool = False) -> Realisation:
-    """The matrices of a system, with zeros for D; without C, if that is allowed, the outputs are the states.
-
-    Raises:
-        ArgumentError: if it has no inputs or no outputs.
-    """
+    """The matrices of a system, with zeros for D; without C, if that is allowed, the outputs are the states."""
     from .realisation import Realisation
 
     system.not_in_a_loop(argument)
@@ -330,11 +311,7 @@ def realised(system: LinearSystem, argument: str = "system", *, of_states: bool 
 
 
 def joined(part: Realisation, arguments: str = "system") -> LinearSystem:
-    """The system with these matrices.
-
-    Raises:
-        ArgumentError: if it has no states.
-    """
+    """The system with these matrices."""
     if not part.size:
         raise ArgumentError(f"{arguments}: expected at least one linear system, got gains alone, which have no states")
     D = part.D if part.D.any() else None
@@ -347,12 +324,7 @@ def is_gain(value: Any) -> bool:
 
 
 def part_of(argument: str, system: Any, *, of_states: bool = False) -> Realisation:
-    """The matrices of a linear system of stepwell, SciPy or python-control.
-
-    Raises:
-        ArgumentError: if it is none.
-        UnsupportedError: if it is sampled already, or not linear.
-    """
+    """The matrices of a linear system of stepwell, SciPy or python-control."""
     if isinstance(system, LinearSystem):
         return realised(system, argument, of_states=of_states)
     if isinstance(system, System):

@@ -414,7 +414,6 @@ class OwnSystem(System):
         return limit, 1, (int(np.ravel_multi_index(on.component, self.v_shape)), along)
 
     def _known(self) -> OwnSystem:
-        """This system with known shapes of its blocks."""
         return self if self.equations is not None else self.for_state_shapes()
 
     @property

@@ -18,15 +18,9 @@ EPS = float(np.finfo(np.float64).eps)
 
 
 class Realisation(NamedTuple):
-    """ṡ = A·s + B·x, z = C·s + D·x. A gain alone has no states.
+    """ṡ = A·s + B·x, z = C·s + D·x. A gain alone has no states. The batch is behind the rows and columns of the matrices.
 
-    Attributes:
-        A: shape (n, n, *batch).
-        B: shape (n, m, *batch).
-        C: shape (r, n, *batch).
-        D: shape (r, m, *batch).
-        velocities: the states that are velocities.
-        x: the inputs, one for each column of B; None for zero.
+    ``velocities`` are the states that are velocities, ``x`` the inputs, one for each column of B; None for zero.
     """
 
     A: Array
@@ -118,12 +112,7 @@ _GAIN = "a gain alone has no state to step; multiply another system by the numbe
 
 
 def of_object(argument: str, value: Any) -> Realisation:
-    """The matrices of an object of SciPy or python-control.
-
-    Raises:
-        DTypeError: if it has neither matrices, nor polynomials, nor zeros and poles.
-        UnsupportedError: if it is a system of samples.
-    """
+    """The matrices of an object of SciPy or python-control."""
     step = getattr(value, "dt", None)
     if step is not None and (isinstance(step, bool) or step != 0):
         raise UnsupportedError(

@@ -62,16 +62,7 @@ class RodSystem(System):
 
 
 def surfaces_for_rods(floor: Any, dims: set[int]) -> tuple[tuple[surfaces.Surface, ...], set[int]]:
-    """The argument ``floor`` of points on rods, and the dimension of rods and surfaces: a set of one number, or empty.
-
-    Args:
-        floor: the argument.
-        dims: the dimension of the rods, likewise.
-
-    Raises:
-        ShapeError: if a surface has another dimension.
-        UnsupportedError: for a way other than "safe".
-    """
+    """The ``floor`` of points on rods, and the dimension of rods and surfaces: like ``dims`` a set of one number, or empty."""
     floors, dims = surfaces.floors(floor), set(dims)
     for i, each in enumerate(floors):
         if each.way != "safe":

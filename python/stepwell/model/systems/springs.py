@@ -53,9 +53,6 @@ class Springs(System):
     damping or drag, forces depend on the velocity, and Verlet, leapfrog and PEFRL refuse the system. ``safe_step`` returns a
     step that is safe. Lengths, masses and times may have any consistent units.
 
-    Raises:
-        ArgumentError: if an argument is wrong.
-
     Example:
         >>> pendulum = sw.Springs([(0, 1)], stiffness=100.0, rest=1.0, fixed=[0], gravity=(0.0, -9.81))
         >>> pendulum.safe_step("false_euler")
@@ -193,7 +190,6 @@ class Springs(System):
             The step in units of time, of the shape of the batch; 0 if no step of the method is stable without damping.
 
         Raises:
-            ArgumentError: what was given and what was expected.
             UnsupportedError: if the method cannot step the system.
 
         Example:

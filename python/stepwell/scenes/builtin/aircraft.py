@@ -26,9 +26,6 @@ def aircraft(form: AttitudeForm = "euler", roll: Any = 40.0, pitch: Any = -10.0)
         form: ``"euler"``, Hoffmann's program, or ``"quaternion"``; see ``stepwell.Aircraft``.
         roll: the largest commanded roll angle, in degrees.
         pitch: the commanded pitch angle, in degrees; below zero the nose is up.
-
-    Raises:
-        ArgumentError: if an argument is wrong.
     """
     roll, pitch = number("roll", roll, unit="degrees"), number("pitch", pitch, unit="degrees")
     system = Aircraft(form, roll=Sinusoid(roll, 2.0 * np.pi / PERIOD), pitch=pitch)

@@ -32,9 +32,6 @@ def bouncing_ball(restitution: Any = 0.8, height: Any = 1.0, gravity: Any = 9.81
         restitution: e, 0 to 1, without a unit.
         height: the height from which it falls, in units of length, above zero.
         gravity: acceleration of free fall, above zero.
-
-    Raises:
-        ArgumentError: if an argument is wrong.
     """
     restitution = number("restitution", restitution)
     if not 0.0 <= restitution <= 1.0:

@@ -23,9 +23,6 @@ def chain(n: Any = 8, modes: Mapping[int, float] | None = None) -> Scene:
     Args:
         n: how many masses, one or more.
         modes: amplitude of each mode by its number, 1 … n; if None, 1 of the slowest and 0.05 of the fastest.
-
-    Raises:
-        ArgumentError: if an argument is wrong.
     """
     system = Chain(n)
     n = system.n

@@ -23,9 +23,6 @@ def cloth(n: Any = 32, shear: Any = 0.5, damping: Any = 0.0) -> Scene:
         n: particles in a row, two or more.
         shear: stiffness of the springs across the meshes, as a share of that of the others, zero or more; none with 0.
         damping: c of all springs, relative to the critical damping of the fastest mode of one alone, zero or more.
-
-    Raises:
-        ArgumentError: if an argument is wrong.
     """
     n = count("n", n, 2)
     fits("n: the springs", 200.0 * n * n, (), "take fewer particles")

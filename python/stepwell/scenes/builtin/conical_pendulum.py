@@ -22,9 +22,6 @@ def conical_pendulum(angle: Any = 60.0) -> Scene:
 
     Args:
         angle: from straight down in degrees, above 0 and below 90.
-
-    Raises:
-        ArgumentError: what is wrong with ``angle``.
     """
     angle = number("angle", angle, unit="degrees")
     if not 0.0 < angle < 90.0:

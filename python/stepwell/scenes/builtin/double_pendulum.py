@@ -20,9 +20,6 @@ def double_pendulum(angles: Any = (120.0, 150.0)) -> Scene:
 
     Args:
         angles: of the rods from straight down in degrees, shape (2,).
-
-    Raises:
-        ArgumentError: what is wrong with ``angles``.
     """
     return hanging_rods(
         "double_pendulum",

@@ -25,9 +25,6 @@ def dzhanibekov(inertia: Any = (1.0, 2.0, 3.0), tilt: Any = 0.01, spin: Any = 1.
         inertia: three principal moments that ascend, the largest not above the sum of the others.
         tilt: ω₁ and ω₃ at the start, as fractions of the spin, 1e-6 to 1.
         spin: ω₂ at the start, in rad per unit of time, 1e-6 to 1e6.
-
-    Raises:
-        ArgumentError: if an argument is wrong.
     """
     moments = numbers("inertia", inertia, positive=True)
     if moments.shape != (3,) or not moments[0] < moments[1] < moments[2]:

@@ -35,9 +35,6 @@ def energy_control(pair: str = "matching", eps: Any = 0.01, form: ControlForm = 
             Hoffmann's −1/r, which is no invariant of the motion.
         eps: ε in units of length per unit of time.
         form: of the control; Hoffmann's is ``"printed"``, see ``stepwell.EnergyControl``.
-
-    Raises:
-        ArgumentError: if an argument is wrong.
     """
     force = PAIRS[known("pair", pair, PAIRS)]
     eps = number("eps", eps, unit="units of length per unit of time")

@@ -26,9 +26,6 @@ def forced_oscillator(omega: Any = 1.0, damping: Any = 0.1, *, amplitude: Any = 
         amplitude: amplitude of the acceleration, in units of length per unit of time squared.
         drive: angular frequency of the acceleration, in radians per unit of time, above zero.
         phase: phase of the acceleration, in radians.
-
-    Raises:
-        ArgumentError: if an argument is wrong.
     """
     omega = frequency("omega", omega)
     damping = number("damping", damping, positive=True)

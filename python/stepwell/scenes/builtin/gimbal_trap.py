@@ -23,9 +23,6 @@ def gimbal_trap(form: AttitudeForm = "euler", roll: Any = 2.0, torque: Any = -1.
         form: ``"euler"``, Hoffmann's program, or ``"quaternion"``; see ``stepwell.Aircraft``.
         roll: the roll angle at the start, in degrees. With 0 the nose passes through the vertical, where Euler angles jump.
         torque: about the pitch axis; below zero it lifts the nose.
-
-    Raises:
-        ArgumentError: if an argument is wrong.
     """
     roll, torque = number("roll", roll, unit="degrees"), number("torque", torque, unit="units of torque")
     system = Aircraft(form, pitch_torque=torque, controllers=False)

@@ -24,9 +24,6 @@ def heavy_top(spin: Any = 10.0, lean: Any = 30.0) -> Scene:
     Args:
         spin: ω₃, in rad per unit of time, 1e-6 to 1e6.
         lean: of the axis from the vertical at the start, in degrees, above 0 and below 180.
-
-    Raises:
-        ArgumentError: if an argument is wrong.
     """
     spin = within("spin", spin, 1e-6, 1e6, "rad per unit of time")
     lean = number("lean", lean, unit="degrees")

@@ -22,9 +22,6 @@ def jelly_cube(n: Any = 4, twist: Any = 4.0) -> Scene:
     Args:
         n: particles along an edge, two or more.
         twist: how fast the top turns at first, and the bottom the other way, in radians per unit of time.
-
-    Raises:
-        ArgumentError: if an argument is wrong.
     """
     n, twist = count("n", n, 2), within("twist", twist, -LARGEST, LARGEST, "radians per unit of time")
     fits("n: the springs", 600.0 * n**3, (), "take fewer particles")

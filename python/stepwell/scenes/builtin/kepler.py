@@ -26,9 +26,6 @@ def kepler(e: Any = 0.9, share: Any = 0.5) -> Scene:
     Args:
         e: eccentricity, 0 or more and below 1.
         share: of the second body in the mass, above 0 and below 1.
-
-    Raises:
-        ArgumentError: if an argument is wrong.
     """
     e, share = number("e", e), number("share", share)
     if not 0.0 <= e < 1.0:

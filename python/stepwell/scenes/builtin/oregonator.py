@@ -16,9 +16,6 @@ def oregonator(horizon: Any = 360.0) -> Scene:
 
     Args:
         horizon: in units of time, above zero.
-
-    Raises:
-        ArgumentError: if ``horizon`` is wrong.
     """
     horizon = moderate("horizon", horizon, "units of time")
     return Scene(

@@ -20,9 +20,6 @@ def oscillator(omega: Any = 1.0) -> Scene:
 
     Args:
         omega: ω₀ in radians per unit of time, above zero.
-
-    Raises:
-        ArgumentError: what is wrong with ``omega``.
     """
     omega = frequency("omega", omega)
 

@@ -24,9 +24,6 @@ def pendulum(amplitude: Any = 90.0, omega: Any = 1.0) -> Scene:
     Args:
         amplitude: in degrees, above 0 and below 180.
         omega: ω₀ of small swings in radians per unit of time, above zero.
-
-    Raises:
-        ArgumentError: if an argument is wrong.
     """
     amplitude = number("amplitude", amplitude, unit="degrees")
     if not 0.0 < amplitude < 180.0:

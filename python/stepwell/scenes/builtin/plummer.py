@@ -29,9 +29,6 @@ def plummer(n: Any = 64, seed: Any = 1, softening: Any = 0.05) -> Scene:
         n: number of stars, two or more.
         seed: seed of the random numbers, a whole number of zero or more; the same seed gives the same stars.
         softening: length ε of the force, in Hénon's units of length, zero or more. With 0 close pairs need a very small step.
-
-    Raises:
-        ArgumentError: if an argument is wrong.
     """
     n, seed = count("n", n, 2), count("seed", seed, 0)
     fits("n: the pairs", 4 * n * n, (), "take fewer stars")

@@ -18,9 +18,6 @@ def rober(horizon: Any = 40.0) -> Scene:
 
     Args:
         horizon: in units of time, above zero.
-
-    Raises:
-        ArgumentError: if ``horizon`` is wrong.
     """
     horizon = moderate("horizon", horizon, "units of time")
     return Scene(

@@ -21,9 +21,6 @@ def rope_bridge(planks: Any = 15, load: Any = 5.0) -> Scene:
     Args:
         planks: number of planks, one or more.
         load: mass on one end of the middle plank, above zero.
-
-    Raises:
-        ArgumentError: if an argument is wrong.
     """
     planks, load = count("planks", planks, 1), moderate("load", load)
     fits("planks: the springs", 300.0 * planks, (), "take fewer planks")

@@ -18,9 +18,6 @@ def sliding_block(friction: Any = 0.5 * 9.81, speed: Any = 3.0) -> Scene:
     Args:
         friction: the deceleration μg in units of length per unit of time squared, above zero.
         speed: v₀ in units of length per unit of time, above zero.
-
-    Raises:
-        ArgumentError: if an argument is wrong.
     """
     friction = moderate("friction", friction)
     speed = moderate("speed", speed)

@@ -21,9 +21,6 @@ def sticking_block(friction: Any = 0.13) -> Scene:
 
     Args:
         friction: μN/m in units of length per unit of time squared, above zero.
-
-    Raises:
-        ArgumentError: what is wrong with ``friction``.
     """
     friction = moderate("friction", friction, "units of length per unit of time squared")
     # At the end of that half swing the spring pulls no harder than friction holds.

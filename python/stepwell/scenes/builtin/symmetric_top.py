@@ -60,9 +60,6 @@ def symmetric_top(axial: Any = 1.6, spin: Any = 2.0, wobble: Any = 1.0) -> Scene
         axial: C, the moment about the axis, in the unit of the two others, above 0 and at most 2, that of a coin.
         spin: ω₃, in rad per unit of time, -1e6 to 1e6.
         wobble: ω₁ at the start, in rad per unit of time, 1e-6 to 1e6.
-
-    Raises:
-        ArgumentError: if an argument is wrong.
     """
     axial = number("axial", axial)
     if not 0.0 < axial <= 2.0:

@@ -13,9 +13,6 @@ def triple_pendulum(angles: Any = (90.0, 120.0, 150.0)) -> Scene:
 
     Args:
         angles: of the rods from straight down in degrees, shape (3,).
-
-    Raises:
-        ArgumentError: what is wrong with ``angles``.
     """
     return hanging_rods(
         "triple_pendulum",

@@ -19,9 +19,6 @@ def van_der_pol(mu: Any = 100.0) -> Scene:
 
     Args:
         mu: μ, above zero.
-
-    Raises:
-        ArgumentError: if ``mu`` is wrong.
     """
     mu = moderate("mu", mu)
     horizon = max(10.0, 2.0 * mu)

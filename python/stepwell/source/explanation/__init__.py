@@ -75,11 +75,7 @@ def explain(
         dtype: ``"float64"`` or ``"float32"``, as in ``integrate``.
         device: as in ``integrate``: for a device, what it runs is in ``kernel``, with the text. Steps of fixed length only.
 
-    Returns:
-        An ``Explanation``.
-
     Raises:
-        ArgumentError: what was given and what was expected.
         UnsupportedError: if the method cannot step the system.
 
     Example:

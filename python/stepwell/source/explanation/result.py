@@ -342,7 +342,6 @@ class Explanation(ValueEquality):
         write_json(self.as_dict(), path)
 
     def _repr_html_(self) -> str:
-        """The explanation as tables, for notebooks."""
         rows = []
         for section in (*self.sections, *self.beside):
             if section.lines:

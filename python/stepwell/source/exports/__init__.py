@@ -93,7 +93,6 @@ def export(
         An ``ExportedStep``: ``.source`` is its text, ``.save(path)`` writes it.
 
     Raises:
-        ArgumentError: if an argument is wrong.
         UnsupportedError: if the method cannot step the system, if the language has no fused multiply-add, or if the step has too
             many operations.
 

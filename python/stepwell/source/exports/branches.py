@@ -42,13 +42,9 @@ class Node(NamedTuple):
 
 @dataclass(eq=False)
 class Branch:
-    """An ``if``.
+    """An ``if``: the number of its condition, what is computed if it holds and if not, and the choices that it makes.
 
-    Attributes:
-        condition: the number of the condition.
-        sides: the values and branches that are computed if it holds, and if not.
-        sets: the choices that it makes.
-        keeps: values of a side that are read after the branch.
+    ``keeps`` are values of a side that are read after the branch.
     """
 
     condition: int
@@ -170,7 +166,6 @@ class Branched:
         return [(condition, ()), *read]
 
     def _choices(self) -> list[int]:
-        """The choices among the operations."""
         return [line for line in self.order if self.nodes[line].name in CHOICES and self._sides(line) is not None]
 
     def _side(self, line: int, side: bool) -> Path:

@@ -109,7 +109,6 @@ HELPERS = {
 
 
 def _narrow(text: str) -> str:
-    """The function for numbers of 32 bits."""
     for wide, single in (("double", "float"), ("uint64_t", "uint32_t"), ("UINT64_C", "UINT32_C"), ("<< 63", "<< 31")):
         text = text.replace(wide, single)
     return text

@@ -70,7 +70,6 @@ ROUNDED = ("add", "subtract", "multiply", "divide", "square root")
 
 
 def _narrow(text: str) -> str:
-    """The function for numbers of 32 bits."""
     return text.replace("double", "float").replace("ulong", "uint").replace("<< 63", "<< 31")
 
 

@@ -19,12 +19,7 @@ from .tapes import Operations
 
 
 class LaneWriter:
-    """Writes the loops of a function.
-
-    Attributes:
-        lines: the loops.
-        size: the length of the array in which values wait for other loops.
-    """
+    """Writes the loops of a function; ``size`` is the length of the array in which values wait for other loops."""
 
     def __init__(
         self,

@@ -53,12 +53,7 @@ class Kernel:
 
 
 class Lanes:
-    """The loops that compute some operations.
-
-    Attributes:
-        of: the operands of each operation; lanes of a loop have theirs in the same order.
-        kernels: the loops in order.
-    """
+    """The loops that compute some operations, in order; lanes of a loop have their operands, ``of``, in the same order."""
 
     def __init__(
         self,

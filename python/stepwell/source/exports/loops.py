@@ -30,13 +30,7 @@ class NoLoopError(Exception):
 
 
 class Looped(NamedTuple):
-    """The values of a function.
-
-    Attributes:
-        loops: the loops that compute them, in order.
-        size: the length of the array of their results.
-        places: the places of the roots.
-    """
+    """The loops that compute the values of a function, in order; the length of the array of results; the places of the roots."""
 
     loops: list[Loop]
     size: int

@@ -99,11 +99,7 @@ def camel(name: str) -> str:
 
 
 def prefix(name: object) -> str:
-    """Return the argument ``name`` if functions and types can have that name.
-
-    Raises:
-        ArgumentError: what was given and what was expected.
-    """
+    """Return the argument ``name`` if functions and types can have that name."""
     if not isinstance(name, str):
         raise DTypeError(f"name: expected a word, got {checks.short(name)} ({type(name).__name__})")
     if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", name, re.ASCII) or len(name) > MAX_PREFIX:
@@ -119,14 +115,9 @@ def prefix(name: object) -> str:
 
 
 class Field(NamedTuple):
-    """A parameter in the structure of a file.
+    """A parameter in the structure of a file: its name, its description, its default numbers in C order.
 
-    Attributes:
-        name: its name in the file.
-        about: its description.
-        values: its default numbers, in C order.
-        shape: the shape of an array; () for a number.
-        wide: whether it is float64 even in a file of float32.
+    The shape of a number is (). A ``wide`` one is float64 even in a file of float32.
     """
 
     name: str

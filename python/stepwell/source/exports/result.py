@@ -54,12 +54,6 @@ class ExportedStep(ValueEquality):
 
         Args:
             path: the file; its ending must be one of ``endings``.
-
-        Returns:
-            The path.
-
-        Raises:
-            ArgumentError: if it has another ending or cannot be written.
         """
         place = paths.file("path", path, self.endings)
         files.write_text(place, self.source)

@@ -52,7 +52,6 @@ HELPERS = {
 
 
 def _narrow(text: str) -> str:
-    """The function for numbers of 32 bits."""
     return text.replace("f64", "f32").replace("u64", "u32").replace("<< 63", "<< 31")
 
 
@@ -180,7 +179,6 @@ fn main() {
 
 
 def _type(text: str, shape: Shape) -> str:
-    """The type of an array of this shape."""
     for n in reversed(shape):
         text = f"[{text}; {n}]"
     return text

@@ -181,7 +181,6 @@ class Skeleton(Language, ABC):
         return [written[name](w) for name in self.order if name not in absent]
 
     def _function(self, about: str, head: str, lines: Iterable[str]) -> list[str]:
-        """A function: its comment, its first line, its body."""
         return [f"{self.doc} {about}", *f"{head} {{".splitlines(), *indented(lines, self.step_in), "}"]
 
     def _with_head(self, w: Written, name: str, lines: Iterable[str]) -> list[str]:

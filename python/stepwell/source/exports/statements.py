@@ -14,14 +14,9 @@ from .program import Assignment, Conditional, Statement
 
 
 class Copy(NamedTuple):
-    """The assignment of a value to a variable.
+    """The assignment of a value, by its number, to a variable; without a value, of ``truth``, or else of zero.
 
-    Attributes:
-        name: the name of the variable.
-        kind: "number" or "truth".
-        value: the number of the value; None for zero, or for ``truth``.
-        reader: the choice whose variable it is; −1 if it is that of no choice.
-        truth: the truth to assign if ``value`` is None.
+    ``reader`` is the choice whose variable it is; −1 if it is that of no choice.
     """
 
     name: str
@@ -32,11 +27,7 @@ class Copy(NamedTuple):
 
 
 class Statements:
-    """Writes the values of a function, and those of a branch within it.
-
-    Attributes:
-        lines: the statements.
-    """
+    """Writes the values of a function, and those of a branch within it, as ``lines``."""
 
     def __init__(
         self,

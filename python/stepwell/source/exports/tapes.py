@@ -38,14 +38,10 @@ NO_NUMBER = (*COMPARISONS, *ON_BITS)
 
 
 class Part(NamedTuple):
-    """A function of the state: the step, or a method's start or finish.
+    """A function of the state, on its tape: the step, or a method's start or finish.
 
-    Attributes:
-        tape: the tape on which it was traced.
-        names: names of values on that tape, by their numbers there.
-        roots: the values that it computes, by their numbers among all operations.
-        inputs: names of the numbers of the state before.
-        results: names of the values that it computes.
+    ``names`` are those of values by their numbers on the tape, ``roots`` the values that it computes by their numbers among all
+    operations, ``inputs`` the names of the numbers of the state before, ``results`` those of what it computes.
     """
 
     tape: Any

@@ -35,12 +35,9 @@ MAX_PIECES, WORST_PIECES = 2000, 20
 
 
 class AdaptiveTrials:
-    """Runs of one scene with a tolerance, each made once.
+    """Runs of one scene with a tolerance, each made once, of at most so many function evaluations.
 
-    Args:
-        motion: the true motion, with which runs are compared.
-        allowed: the largest allowed state error; larger errors need not be known exactly.
-        most: the most function evaluations of a run.
+    A state error above the ``allowed`` one need not be known exactly.
     """
 
     def __init__(self, motion: Motion, allowed: float, most: float) -> None:

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 from functools import cached_property
-from typing import Protocol
 
 from ...model.methods import Method
 from .adaptive import AdaptiveTrials
@@ -35,55 +34,12 @@ FIRST_RUN_SHARE = 1 / 16
 ERROR_SHARE = 0.95
 
 
-class Candidate(Protocol):
-    """A method, and how its steps are chosen.
-
-    Attributes:
-        method: the method.
-        by: ``"step"`` or ``"tolerance"``.
-        name: the method's name, followed by "tolerance" for adaptive steps: ``"merson, tolerance"``; or by "float32".
-        dtype: the precision of its steps.
-        first: the least k.
-        share: the fraction of the allowed error that its runs may have.
-        seen: its runs so far, by k.
-    """
-
-    method: Method
-    by: str
-    name: str
-    dtype: str
-    first: int
-    share: float
-    seen: dict[int, Trial]
-
-    @property
-    def evaluations(self) -> int:
-        """Function evaluations of a step, or of an attempt at one."""
-
-    def look(self, k: int) -> Trial:
-        """The run with that k."""
-
-    def confirm(self, k: int) -> Trial:
-        """The run with that k, measured more closely."""
-
-    def measured(self, k: int) -> Trial:
-        """As ``confirm``, for a run that need not be good enough."""
-
-    def within_limit(self, k: int) -> int:
-        """This k, or the least larger one with which a linear system does not blow up, nor with somewhat longer steps."""
-
-    def keeps_margin(self, k: int) -> bool:
-        """True if runs with somewhat longer steps do not blow up."""
-
-    def possible(self, k: int) -> bool:
-        """True if there is a run with that k."""
-
-    def described(self, k: int) -> str:
-        """The steps or the tolerance of k, in words."""
-
-
 class Fixed:
-    """Steps of one length: k of them in a span of the grid."""
+    """Steps of one length: k of them in a span of the grid.
+
+    As for all candidates, ``first`` is the least k, ``share`` the fraction of the allowed error that its runs may have, and
+    ``seen`` are its runs so far, by k.
+    """
 
     by = "step"
     dtype = "float64"
@@ -127,17 +83,10 @@ class Fixed:
 
 
 class Single(Fixed):
-    """Steps of one length in float32.
+    """Steps of one length in float32; ``wide`` are the runs with the same steps in float64.
 
-    Shorter steps do not help where rounding alone is above the allowed error, so the search ends there.
-
-    Args:
-        method: the method.
-        trials: runs in float32.
-        grid: the possible steps.
-        share: the fraction of the allowed error that a run may have.
-        wide: the runs with the same steps in float64.
-        allowed: the state error that its runs may have.
+    Shorter steps do not help where rounding alone is above the allowed error, so the search ends there. A run may have this
+    ``share`` of it.
     """
 
     dtype = "float32"
@@ -219,3 +168,7 @@ class Adaptive:
     def described(self, k: int) -> str:
         """The tolerance."""
         return f"a tolerance of {self.tolerance(k):g}"
+
+
+#: A method, and how its steps are chosen.
+Candidate = Fixed | Adaptive

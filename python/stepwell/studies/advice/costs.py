@@ -27,15 +27,9 @@ class Times(dict[str, float]):
 
 
 def step_times(scene: Scene, methods: Sequence[Method], singles: Sequence[Method] = ()) -> Times:
-    """Nanoseconds per step of one member of a batch, on one thread; all take turns.
+    """Nanoseconds per step of one member of a batch, on one thread, by the method's name; all take turns.
 
-    Args:
-        scene: the scene that is stepped.
-        methods: the methods in float64.
-        singles: the methods in float32.
-
-    Returns:
-        Times by the method's name, those in float32 by ``single_name``.
+    ``singles`` are the methods in float32, whose times have the names of ``single_name``.
     """
     batch = Batch(scene, EFFORT.members_of(scene))
     runs = {method.name: batch.steps(method, control=scene.control) for method in methods}

@@ -47,13 +47,7 @@ CACHED_ANSWERS = 96
 
 
 class Grid(NamedTuple):
-    """The possible steps: k = 1, 2, … of them in a span of time.
-
-    Attributes:
-        span: the frame, or the whole horizon without one, in units of time.
-        spans: the number of spans that reach the horizon.
-        framed: whether the spans are frames.
-    """
+    """The possible steps: k = 1, 2, … in a span, a frame or else the whole horizon; so many spans reach the horizon."""
 
     span: float
     spans: int
@@ -116,9 +110,6 @@ def motion_of(scene: Scene, frame: float | None, tolerance: float, single: bool 
     """The true motion of a scene, over whole frames; with ``single`` a little further, where it is known.
 
     Runs of float32 make steps that are rounded to it, so they end a little later or earlier than others.
-
-    Raises:
-        ArgumentError: if it is not known to the end of the first frame.
     """
     horizon = scene.horizon
     grid = grid_of(horizon, frame)

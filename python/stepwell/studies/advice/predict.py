@@ -52,12 +52,7 @@ class Prediction(NamedTuple):
 
 
 class Rates(NamedTuple):
-    """Eigenvalues of the rates at states of the true motion.
-
-    Attributes:
-        times: the times of these states.
-        values: the eigenvalues, shape (times, numbers of a state).
-    """
+    """Eigenvalues of the rates at states of the true motion, shape (times, numbers of a state), and the times of these."""
 
     times: Array
     values: Complex
@@ -190,10 +185,7 @@ def rates_along(trials: Trials) -> Rates | None:
 def observed_limit(trials: Trials, method: Method, stable: int) -> float:
     """The largest step whose run over the horizon does not grow, within 2 %: infinite if four steps do not, 0 if none is stable.
 
-    Args:
-        trials: runs of the scene.
-        method: the method.
-        stable: a number of steps over the horizon with which the method is stable, and with ``MARGIN`` times fewer.
+    The method is stable with ``stable`` steps over the horizon, and with ``MARGIN`` times fewer.
     """
     horizon = trials.scene.horizon
 

@@ -126,9 +126,6 @@ class Advice:
         Returns:
             A ``Run`` with every step saved, or with a tolerance the states at ``asked``. ``advice.scene.state_error`` computes
             its errors.
-
-        Raises:
-            ArgumentError: if there is no row.
         """
         row = self.best if row is None else row
         if row is None:

@@ -78,14 +78,10 @@ class Fewest(NamedTuple):
 
 
 class Missed(NamedTuple):
-    """Why a candidate was given up: ``unstable``, ``inaccurate`` or ``dominated``.
+    """Why a candidate was given up: ``unstable``, ``inaccurate`` or ``dominated``; the largest k that was run, and its run.
 
-    Attributes:
-        kind: which of these.
-        k: the largest k that was run.
-        trial: its run.
-        expected: the k that would be needed according to the order, or None.
-        expensive: whether more steps were not tried because they cost too much compared with the best.
+    ``expected`` is the k that would be needed according to the order, or None; ``expensive`` says whether more steps were not
+    tried because they cost too much compared with the best.
     """
 
     kind: str

@@ -62,13 +62,9 @@ class Trial(NamedTuple):
 
 
 class Trials:
-    """Runs of one scene with fixed steps, each made once.
+    """Runs of one scene with fixed steps of this precision, each made once.
 
-    Args:
-        motion: the true motion, with which runs are compared.
-        tolerance: the allowed state error.
-        long: a run of more rate evaluations than this is stopped where it has no correct digit.
-        dtype: the precision of the runs.
+    A run of more rate evaluations than ``long`` is stopped where it has no correct digit.
     """
 
     def __init__(self, motion: Motion, tolerance: float, long: float, dtype: str = "float64") -> None:

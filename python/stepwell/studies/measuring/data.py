@@ -242,7 +242,6 @@ class WorkPrecision(Drawn, Table, ValueEquality):
             time: whether measured times are those of a ``"batch"`` or of a ``"single"`` run.
 
         Raises:
-            ArgumentError: if there is no such error, time or format.
             UnsupportedError: if matplotlib is missing.
         """
         return drawn(path, lambda: self.draw(error, time))
@@ -258,9 +257,6 @@ class WorkPrecision(Drawn, Table, ValueEquality):
 
         Returns:
             A row for each: scene, method, steps, dt, tolerance, cost per unit of simulated time, error.
-
-        Raises:
-            ArgumentError: if there is no such error or cost.
         """
         known("error", error, ERRORS)
         known("cost", cost, COSTS)

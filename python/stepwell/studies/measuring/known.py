@@ -28,9 +28,6 @@ def chartable(scene: Scene) -> tuple[Scene, float]:
     """The scene without a control, with a motion that is known over its whole horizon, and the least meaningful error.
 
     A scene without an exact solution gets one by ``with_truth``, and ends where that does.
-
-    Raises:
-        ArgumentError: if the true motion is not known for any time.
     """
     if scene.exact is not None and scene.until >= scene.horizon:
         return scene, 0.0

@@ -107,11 +107,7 @@ def assess_tolerance(scene: Scene, method: Method, tolerance: float, fused: bool
 
 
 def assess_peer(scene: Scene, peer: Peer) -> Curve:
-    """Run the scene by a peer at each of its settings.
-
-    Raises:
-        UnsupportedError: if the peer cannot solve the scene, or is not installed.
-    """
+    """Run the scene by a peer at each of its settings."""
     times = output_times(scene)
     points, spent = [], []
     for setting in sorted(peer.settings, reverse=True):

@@ -105,11 +105,7 @@ class Peer(ValueEquality):
 
 
 def peer(function: Peer | Callable[[Scene, Array, float], Solved]) -> Peer:
-    """A peer with this function and its name, whose settings are tolerances.
-
-    Raises:
-        DTypeError: if it is neither a peer nor a function.
-    """
+    """A peer with this function and its name, whose settings are tolerances."""
     if not isinstance(function, Peer) and not callable(function):
         raise DTypeError(f"peers: expected a Peer, such as peers.scipy(), or a function, got {short(function)}")
     return function if isinstance(function, Peer) else Peer(getattr(function, "__name__", type(function).__name__), function)
@@ -171,9 +167,6 @@ def heyoka(settings: Sequence[float] = TOLERANCES) -> Peer:
 
     The evaluations of a step are those of ``taylor`` with the same order (``Paces.evaluations``), or unknown where that would be
     too long. States between steps come from the series. Compilation before the run is not timed.
-
-    Raises:
-        UnsupportedError: if heyoka is not installed.
     """
     _need("heyoka", "heyoka")
     return Peer("heyoka", ByHeyoka(), settings)
@@ -219,9 +212,6 @@ def rebound(integrator: str = "ias15", settings: Sequence[float] | None = None) 
         integrator: ``"ias15"`` or ``"bs"`` by tolerance (for ias15 its ``epsilon``, which is not an error but a power of one), or
             ``"leapfrog"`` by step.
         settings: tolerances, or steps; steps are needed for leapfrog.
-
-    Raises:
-        UnsupportedError: if REBOUND is not installed.
     """
     _need("rebound", "rebound")
     known("integrator", integrator, REBOUND)

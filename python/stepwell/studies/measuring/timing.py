@@ -142,14 +142,8 @@ def step_times(
 ) -> dict[str, Timing]:
     """Nanoseconds per step of one member of a batch, by method.
 
-    The time of a step depends neither on its length nor on the state, so one measurement serves a whole curve.
-
-    Args:
-        scene: the scene.
-        methods: the methods.
-        members: the members of the batch; those of ``CHARTS`` if None, and 0 for a run without a batch.
-        fused: whether to use fused multiply-adds.
-        dtype: the precision, float64 or float32.
+    The time of a step depends neither on its length nor on the state, so one measurement serves a whole curve. ``members`` are
+    those of ``CHARTS`` if None, and 0 for a run without a batch.
     """
     batch = Batch(scene, CHARTS.members_of(scene) if members is None else members)
     return _summaries(batch, {method.name: batch.steps(method, fused=fused, dtype=dtype) for method in methods})

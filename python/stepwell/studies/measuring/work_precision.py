@@ -93,7 +93,6 @@ def work_precision(
         A ``WorkPrecision``. Methods that cannot step the system are in its ``refused``, with the reason.
 
     Raises:
-        ArgumentError: what was given and what was expected.
         UnsupportedError: if a peer is not installed.
 
     Example:

@@ -8,16 +8,6 @@ from .outcomes import Extremes, Function, History, Last, Mean
 from .samples import random, sobol
 
 __all__ = [
-    "Crossing",
-    "Evaluations",
-    "Exponents",
-    "Extremes",
-    "Function",
-    "History",
-    "Last",
-    "Mean",
-    "Period",
-    "random",
-    "sobol",
+    "Crossing", "Evaluations", "Exponents", "Extremes", "Function", "History", "Last", "Mean", "Period", "random", "sobol",
     "sweep",
-]
+]  # fmt: skip

@@ -30,14 +30,13 @@ from ...runs.request import Request
 from ...runs.result import Run, Status
 from .axes import Grid
 from .exponents import Exponents
-from .observed import Piece
-from .outcomes import Outcome, ReducedOutcome, Reduction, Results, Variable
+from .outcomes import OfEnd, Outcome, Results, Variable
 
 #: The numbers of the step-size controller for each member in memory: before, after, and in transfer.
 NUMBERS_OF_A_CONTROLLER = 4 * PACE_NUMBERS
 
 
-class Evaluations(ReducedOutcome):
+class Evaluations(OfEnd):
     """The cost of a member, with a tolerance: ``evaluations``, ``accepted_steps``, ``rejected_steps``.
 
     They are those of ``run.paces``: function (rate) evaluations of accepted and rejected steps, and of the extra steps for the
@@ -50,19 +49,9 @@ class Evaluations(ReducedOutcome):
         True
     """
 
-    observes = False
-
-    def begin(self) -> Reduction:
-        """A new reduction."""
-        return _Evaluations()
-
-
-class _Evaluations(Reduction):
-    def see(self, piece: Piece) -> None:
-        self.run = piece.run
-
-    def results(self) -> Results:
-        paces = self.run.paces
+    def of_end(self, run: Run) -> Results:
+        """The counts of the paces."""
+        paces = run.paces
         assert paces is not None
         return {
             "evaluations": Variable((), np.array(paces.evaluations), "function evaluations"),
@@ -72,12 +61,7 @@ class _Evaluations(Reduction):
 
 
 def arguments(grid: Grid, method: Method, asked: Checked, outcomes: Iterable[Outcome]) -> tuple[dict[str, Any], Array]:
-    """Further arguments of ``integrate``, and the times.
-
-    Raises:
-        ArgumentError: what was given and what was expected.
-        UnsupportedError: if an argument is not supported with a tolerance.
-    """
+    """Further arguments of ``integrate``, and the times."""
     tolerance = asked["tolerance"]
     varied = {axis.argument: axis for axis in grid.axes}
     if "dt" in varied:
@@ -151,13 +135,7 @@ def numbers_of_waypoints(state: int) -> int:
 
 
 class Pieces:
-    """The pieces of the run of a chunk, and where its members stood on the way if stiffness is looked for.
-
-    Args:
-        system: the system of the chunk.
-        method: the method.
-        looks: whether stiffness is looked for.
-    """
+    """The pieces of the run of a chunk, and where its members stood on the way if it ``looks`` for stiffness."""
 
     def __init__(self, system: System, method: Method, *, looks: bool) -> None:
         self.system, self._method, self._looks = system, method, looks

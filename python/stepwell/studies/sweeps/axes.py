@@ -19,14 +19,7 @@ OF_THE_RUN = ("v", "y", "dt", "force", "tolerance")
 
 
 class Axis(NamedTuple):
-    """The values of one argument.
-
-    Attributes:
-        argument: its name.
-        dims: names of the dimensions along which it varies.
-        values: shape (*own axes of the argument, *sizes of the dimensions).
-        attrs: its attributes, such as units.
-    """
+    """The values of one argument, shape (*own axes of the argument, *sizes of the dimensions), and its attributes, as a unit."""
 
     argument: str
     dims: tuple[str, ...]
@@ -40,13 +33,9 @@ class Axis(NamedTuple):
 
 
 class Chunk(NamedTuple):
-    """Members that are computed together: a piece of the grid, whose members follow each other.
+    """Members that are computed together: a piece of the grid, whose members follow each other, from number ``first`` on.
 
-    Attributes:
-        place: the index of the chunk along each dimension.
-        slices: its members along each dimension.
-        shape: the number of members along each dimension.
-        first: the number of its first member.
+    ``place``, ``slices`` and ``shape`` are its index, its members and their number along each dimension.
     """
 
     place: Shape
@@ -65,11 +54,6 @@ class Grid:
 
     Members are numbered with the last dimension fastest. Dimensions of ``dt`` come first, so that members with the same step
     follow each other, since most runs have one step.
-
-    Attributes:
-        axes: the arguments that vary.
-        dims: names of the dimensions.
-        shape: their sizes.
     """
 
     def __init__(self, axes: list[Axis]) -> None:
@@ -148,11 +132,7 @@ class Grid:
 
 
 def grid(axes: Any) -> Grid:
-    """The grid of the user's axes.
-
-    Raises:
-        ArgumentError: what was given and what was expected.
-    """
+    """The grid of the user's axes."""
     if not isinstance(axes, Mapping):
         order = "; axes stand before the method, sweep(system, axes, method)" if isinstance(axes, (str, Method)) else ""
         if callable(axes) or isinstance(axes, System):

@@ -55,66 +55,6 @@ class _Passages(ReducedOutcome):
         return reductions.Passages(of[0], self.level, self.direction, has_last, states)
 
 
-class Crossing(_Passages):
-    """The first time at which a quantity passes a level, ``y_crossing``; NaN if it did not.
-
-    It passes between two observed states if it is below the level at the first and not below at the second (rising; likewise
-    falling). For v, y and their components the time is that of the cubic through both values with the rates of the system at both
-    (Hermite): its error is of the order of (interval)⁴. For other quantities it is linear, with an error of the order of
-    (interval)². A passage and return between two observed states is not seen.
-
-    Args:
-        of: "v" or "y", a component such as ("y", 0), a quantity such as "energy", or a function f(t, v, y) of states, whose v
-            and y have the shape (*block, states, members).
-        level: the level, in the units of the quantity.
-        direction: 1 or "rising", −1 or "falling", 0 or "both", as for ``Event``.
-        name: the name of the results, in place of that of the quantity.
-
-    Example:
-        >>> quarter = sw.sweeps.Crossing("y", direction=-1)
-        >>> axes = {"omega": ("omega", [1.0, 2.0])}
-        >>> found = sw.sweep(sw.Oscillator, axes, "rk4", v=0.0, y=1.0, dt=0.01, steps=200, outcomes=quarter)
-        >>> found.y_crossing.values.round(6)
-        array([1.570796, 0.785398])
-    """
-
-    def begin(self) -> Reduction:
-        """A new reduction."""
-        return _Crossing(self)
-
-    def on_device(self, rows: Rows) -> Any:
-        """The first passage on a device."""
-        return self.passages(rows, has_last=False)
-
-
-class Period(_Passages):
-    """The mean time between passages of a level in one direction, ``y_period``, and their number, ``y_passages``.
-
-    It is the time from the first to the last, divided by the number of intervals between them; NaN if there are fewer than two.
-    Times are those of ``Crossing``. A direction 0 gives the half of a symmetric oscillation's period.
-
-    Args:
-        of: as for ``Crossing``.
-        level: the level, in the units of the quantity.
-        direction: 1 or "rising", −1 or "falling", 0 or "both", as for ``Event``.
-        name: the name of the results, in place of that of the quantity.
-
-    Example:
-        >>> axes = {"y": ("y0", [0.1, 2.0])}
-        >>> found = sw.sweep(sw.Pendulum(), axes, "rk4", v=0.0, dt=0.01, steps=5000, outcomes="period")
-        >>> found.y_period.values.round(5)  # four complete elliptic integrals
-        array([6.28711, 8.34975])
-    """
-
-    def begin(self) -> Reduction:
-        """A new reduction."""
-        return _Period(self)
-
-    def on_device(self, rows: Rows) -> Any:
-        """The first and the last passage on a device, and their number."""
-        return self.passages(rows, has_last=True)
-
-
 class _State(NamedTuple):
     """A state, of all members: its time, the value there, and blocks."""
 
@@ -128,7 +68,7 @@ class _Seeing(Reduction):
     """Finds passages in pieces."""
 
     def __init__(self, outcome: _Passages) -> None:
-        self.outcome = outcome
+        super().__init__(outcome)
         self.before: _State | None = None
 
     def see(self, piece: Piece) -> None:
@@ -249,6 +189,36 @@ class _Crossing(_Seeing):
         return {f"{name}_crossing": Variable((), self.time, about, "t")}
 
 
+class Crossing(_Passages):
+    """The first time at which a quantity passes a level, ``y_crossing``; NaN if it did not.
+
+    It passes between two observed states if it is below the level at the first and not below at the second (rising; likewise
+    falling). For v, y and their components the time is that of the cubic through both values with the rates of the system at both
+    (Hermite): its error is of the order of (interval)⁴. For other quantities it is linear, with an error of the order of
+    (interval)². A passage and return between two observed states is not seen.
+
+    Args:
+        of: "v" or "y", a component such as ("y", 0), a quantity such as "energy", or a function f(t, v, y) of states, whose v
+            and y have the shape (*block, states, members).
+        level: the level, in the units of the quantity.
+        direction: 1 or "rising", −1 or "falling", 0 or "both", as for ``Event``.
+        name: the name of the results, in place of that of the quantity.
+
+    Example:
+        >>> quarter = sw.sweeps.Crossing("y", direction=-1)
+        >>> axes = {"omega": ("omega", [1.0, 2.0])}
+        >>> found = sw.sweep(sw.Oscillator, axes, "rk4", v=0.0, y=1.0, dt=0.01, steps=200, outcomes=quarter)
+        >>> found.y_crossing.values.round(6)
+        array([1.570796, 0.785398])
+    """
+
+    reduction = _Crossing
+
+    def on_device(self, rows: Rows) -> Any:
+        """The first passage on a device."""
+        return self.passages(rows, has_last=False)
+
+
 class _Period(_Seeing):
     def __init__(self, outcome: Period) -> None:
         super().__init__(outcome)
@@ -280,3 +250,29 @@ class _Period(_Seeing):
             f"{name}_period": Variable((), period, about, "t"),
             f"{name}_passages": Variable((), np.asarray(self.count), f"how many passages of {name} were seen"),
         }
+
+
+class Period(_Passages):
+    """The mean time between passages of a level in one direction, ``y_period``, and their number, ``y_passages``.
+
+    It is the time from the first to the last, divided by the number of intervals between them; NaN if there are fewer than two.
+    Times are those of ``Crossing``. A direction 0 gives the half of a symmetric oscillation's period.
+
+    Args:
+        of: as for ``Crossing``.
+        level: the level, in the units of the quantity.
+        direction: 1 or "rising", −1 or "falling", 0 or "both", as for ``Event``.
+        name: the name of the results, in place of that of the quantity.
+
+    Example:
+        >>> axes = {"y": ("y0", [0.1, 2.0])}
+        >>> found = sw.sweep(sw.Pendulum(), axes, "rk4", v=0.0, dt=0.01, steps=5000, outcomes="period")
+        >>> found.y_period.values.round(5)  # four complete elliptic integrals
+        array([6.28711, 8.34975])
+    """
+
+    reduction = _Period
+
+    def on_device(self, rows: Rows) -> Any:
+        """The first and the last passage on a device, and their number."""
+        return self.passages(rows, has_last=True)

@@ -21,15 +21,7 @@ from .task import Task
 
 
 def layout_of(task: Task, grid: Grid, system: System, bits: str, units: dict[str, str]) -> Layout:
-    """The layout of the results of a task, and its description in attributes.
-
-    Args:
-        task: the task of every chunk.
-        grid: the members.
-        system: the system of the first member.
-        bits: a hash of the first steps.
-        units: units by name.
-    """
+    """The layout of the results of a task, and its description in attributes; ``bits`` is a hash of the first steps."""
     coords = coordinates(grid, units)
     renamed = {"t": "saved"} if grid.of_dt else {}
     if task.kinds(History):
@@ -69,7 +61,6 @@ def layout_of(task: Task, grid: Grid, system: System, bits: str, units: dict[str
 
 
 def _step_facts(task: Task, grid: Grid) -> dict[str, Any]:
-    """The length and the number of steps."""
     if task.at is None:
         dt = {} if grid.of_dt else {"dt": task.options["dt"]}
         return {**dt, "steps": task.steps, "transient": task.transient, "observe": task.observe}

@@ -21,15 +21,10 @@ Submit = Callable[[Chunk], "Future[tuple[Chunk, Done]]"]
 
 
 class Engine:
-    """Computes chunks.
+    """Computes chunks, ``workers`` of them at once; ``here`` says whether threads of this process do.
 
-    Args:
-        engine: the user's argument: None, an ``Executor``, or a ``dask.distributed.Client``.
-        threads: the number of threads; None for as many as there are cores.
-
-    Attributes:
-        workers: the number of chunks that are computed at once.
-        here: whether threads of this process compute them.
+    The user's argument is None, an ``Executor``, or a ``dask.distributed.Client``; threads of None are as many as there are
+    cores.
     """
 
     def __init__(self, engine: Any, threads: int | None) -> None:

@@ -333,7 +333,6 @@ def _members(task: Task, system: System, grid: Grid, workers: int, chunk: int | 
 
 
 def _compute(task: Task, grid: Grid, engine: Engine, results: Memory | Zarr, progress: bool) -> None:
-    """Compute every chunk that is not finished, and store its results."""
     done, tally = 0, _Tally(grid, task)
 
     def unfinished() -> Iterator[Chunk]:  # one after the other, since there may be too many for memory

@@ -14,20 +14,14 @@ from ...runs.events import Event
 from ...runs.events.event import several
 from ...runs.result import Run, Status
 from .exponents import Exponents
-from .observed import Piece
-from .outcomes import Function, Outcome, ReducedOutcome, Reduction, Results, Variable
+from .outcomes import Function, OfEnd, Outcome, Results, Variable
 
 #: The status of a member that an event stopped.
 EVENTS = (int(Status.EVENT), int(Status.REST))
 
 
 def events_of(events: Any, outcomes: Iterable[Outcome], transient: Any) -> tuple[Event, ...]:
-    """The events, checked; only one occurrence of each is stored unless a function needs more.
-
-    Raises:
-        ArgumentError: what was given and what was expected.
-        UnsupportedError: if an argument is not supported with events.
-    """
+    """The events, checked; only one occurrence of each is stored unless a function needs more."""
     located = several(events)
     for event in located:
         if not event.name.isidentifier():
@@ -48,10 +42,8 @@ def events_of(events: Any, outcomes: Iterable[Outcome], transient: Any) -> tuple
     return tuple(changed(event, most=1) for event in located)
 
 
-class EventCounts(ReducedOutcome):
+class EventCounts(OfEnd):
     """The outcome of the events of a sweep."""
-
-    observes = False
 
     def __init__(self, events: tuple[Event, ...]) -> None:
         self.events = events
@@ -60,17 +52,9 @@ class EventCounts(ReducedOutcome):
     def check(self, system: System) -> None:
         """The run itself raises if they cannot be found."""
 
-    def begin(self) -> Reduction:
-        """A new reduction."""
-        return _Happenings()
-
-
-class _Happenings(Reduction):
-    def see(self, piece: Piece) -> None:
-        self.run: Run = piece.run
-
-    def results(self) -> Results:
-        run, results = self.run, {}
+    def of_end(self, run: Run) -> Results:
+        """Numbers and first times of the events."""
+        results = {}
         for name, each in run.events.items():
             first = np.full(run.status.size, np.nan)
             first[each.member[::-1]] = each.t[::-1]

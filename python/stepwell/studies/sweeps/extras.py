@@ -12,11 +12,7 @@ COMMAND = 'pip install "stepwell[sweep]"'
 
 
 def need(module: str) -> Any:
-    """The module of that name.
-
-    Raises:
-        UnsupportedError: if its package is missing.
-    """
+    """The module of that name."""
     try:
         return importlib.import_module(module)
     except ImportError as error:

@@ -22,14 +22,7 @@ BYTES_OF_HASH, BYTES_OF_CHUNK_HASH = 16, 8
 
 
 class Planned(NamedTuple):
-    """One array of the result.
-
-    Attributes:
-        dims: its dimensions, those of the sweep first.
-        shape: their sizes.
-        dtype: the type of its numbers.
-        attrs: its attributes.
-    """
+    """One array of the result; the dimensions of the sweep come first."""
 
     dims: tuple[str, ...]
     shape: Shape
@@ -43,14 +36,10 @@ class Planned(NamedTuple):
 
 
 class Layout(NamedTuple):
-    """The layout of the results of a sweep.
+    """The layout of the results of a sweep of a grid: coordinates by name, as dimensions, values and attributes.
 
-    Attributes:
-        grid: its members.
-        coords: coordinates by name: dimensions, values, attributes.
-        attrs: the attributes of the dataset, which say how it was made.
-        units: units by quantity: "t", "v", "y", or the name of a variable.
-        renamed: other names for own dimensions.
+    ``attrs`` say how the dataset was made, ``units`` are by "t", "v", "y" or the name of a variable, ``renamed`` are other names
+    for own dimensions.
     """
 
     grid: Grid

@@ -63,14 +63,9 @@ class Piece(NamedTuple):
 
 
 class Rows:
-    """The rows of the numbers that a device observes: v, y, then quantities, in the order in which they are asked for.
+    """The rows of the numbers that a device observes: v, y, then the quantities ``names``, in the order of asking.
 
-    Args:
-        system: the system.
-        records: whether the device computes quantities of a state.
-
-    Attributes:
-        names: the quantities that were asked for.
+    ``records`` says whether the device computes quantities of a state.
     """
 
     def __init__(self, system: System, *, records: bool) -> None:
@@ -98,13 +93,9 @@ class Rows:
 
 
 class Observed(NamedTuple):
-    """The results of a device for all observed states of a run of a chunk of members.
+    """The results of a device, shape (results, members), for all observed states of a run, which has the last state alone.
 
-    Attributes:
-        run: the run, with the last state alone.
-        numbers: the results of a reduction on the device, shape (results, members).
-        begin: the time of the first observed state, or that of each member.
-        end: that of the last one, likewise.
+    ``begin`` and ``end`` are the times of the first and of the last observed state, or those of each member.
     """
 
     run: Run
@@ -137,11 +128,7 @@ def name_of(what: Of | Callable[..., Any]) -> str:
 
 
 def checked(what: Any) -> Of:
-    """An argument that should be an observable quantity, checked.
-
-    Raises:
-        ArgumentError: if not.
-    """
+    """An argument that should be an observable quantity, checked."""
     if isinstance(what, tuple):
         if len(what) < 2 or what[0] not in ("v", "y"):
             raise ArgumentError(f"of: expected a component such as ('y', 0), got {checks.short(what)}")

@@ -25,12 +25,7 @@ from .outcomes import ReducedOutcome, Reduction
 
 
 class Observing(NamedTuple):
-    """The reductions that a device makes of the states of a chunk.
-
-    Attributes:
-        observer: its reductions.
-        names: the quantities that it computes of each state.
-    """
+    """The reductions that a device makes of the states of a chunk, and the names of quantities that it computes of each."""
 
     observer: Observer
     names: tuple[str, ...]

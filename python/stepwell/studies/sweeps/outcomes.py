@@ -22,14 +22,9 @@ from .observed import Observed, Of, Piece, Rows, block_dims, checked, dtype_of, 
 
 
 class Variable(NamedTuple):
-    """A result of the members of a chunk.
+    """A result of the members of a chunk, shape (*own axes, members), with names and coordinates of its own axes.
 
-    Attributes:
-        dims: names of its own axes.
-        values: shape (*own axes, members).
-        about: its description.
-        unit: the quantity whose unit it has, "v", "y" or "t"; None for others.
-        coords: coordinates along its own axes, by name.
+    ``unit`` is the quantity whose unit it has, "v", "y" or "t"; None for others.
     """
 
     dims: tuple[str, ...]
@@ -43,11 +38,7 @@ Results = dict[str, Variable]
 
 
 def together(parts: Iterable[Results]) -> Results:
-    """The results of several outcomes in one dictionary.
-
-    Raises:
-        ArgumentError: if two have the same name.
-    """
+    """The results of several outcomes in one dictionary."""
     results: Results = {}
     for part in parts:
         if twice := sorted(set(results) & set(part)):
@@ -58,6 +49,9 @@ def together(parts: Iterable[Results]) -> Results:
 
 class Reduction(ABC):
     """Reduces the pieces of a run, in their order, to a few numbers of each member."""
+
+    def __init__(self, outcome: Any) -> None:
+        self.outcome = outcome
 
     @abstractmethod
     def see(self, piece: Piece) -> None:
@@ -90,13 +84,34 @@ class Outcome(ValueEquality):
 class ReducedOutcome(Outcome, ABC):
     """An outcome that a reduction computes piece by piece, so that the run is never in memory as a whole."""
 
-    @abstractmethod
+    reduction: ClassVar[type[Reduction]]
+
     def begin(self) -> Reduction:
         """A new reduction."""
+        return self.reduction(self)
 
     def on_device(self, rows: Rows) -> Any:
         """The device's form of the reduction, of ``device.reductions``; None if it needs the states here."""
         return None
+
+
+class _AtEnd(Reduction):
+    def see(self, piece: Piece) -> None:
+        self.run = piece.run
+
+    def results(self) -> Results:
+        return self.outcome.of_end(self.run)  # type: ignore[no-any-return]
+
+
+class OfEnd(ReducedOutcome):
+    """An outcome of the end of a run alone."""
+
+    observes = False
+    reduction = _AtEnd
+
+    @abstractmethod
+    def of_end(self, run: Run) -> Results:
+        """The results of a run, of which the last state is there."""
 
 
 def _blocks(system: System) -> tuple[str, ...]:
@@ -115,7 +130,7 @@ def _unit(what: Of) -> str | None:
     return block if isinstance(block, str) else None
 
 
-class Last(ReducedOutcome):
+class Last(OfEnd):
     """The state at the end: ``v_last`` and ``y_last``.
 
     Example:
@@ -125,19 +140,8 @@ class Last(ReducedOutcome):
         array([ 0.540302, -0.416147])
     """
 
-    observes = False
-
-    def begin(self) -> Reduction:
-        """A new reduction."""
-        return _Last()
-
-
-class _Last(Reduction):
-    def see(self, piece: Piece) -> None:
-        self.run = piece.run
-
-    def results(self) -> Results:
-        run = self.run
+    def of_end(self, run: Run) -> Results:
+        """The last blocks."""
         return {
             f"{block}_last": Variable(
                 block_dims(run.system, block), np.array(getattr(run, block)[-1]), f"{block} at the end", block
@@ -175,37 +179,9 @@ class _Several(ReducedOutcome):
         return arrays
 
 
-class Extremes(_Several):
-    """The least and the largest value among the observed states, ``y_min`` and ``y_max``; NaN if a state was NaN.
-
-    Between observed states the motion may go beyond: at a smooth extreme by (interval)²·|ÿ|/8 at most.
-
-    Args:
-        of: as for ``Crossing``; both blocks if None.
-        name: the name of the results, in place of that of the quantity.
-
-    Example:
-        >>> outcome = sw.sweeps.Extremes("energy")
-        >>> found = sw.sweep(sw.Oscillator, {"omega": [1.0, 2.0]}, "rk4", v=0.0, y=1.0, dt=0.1, steps=100, outcomes=outcome)
-        >>> sorted(found.data_vars)
-        ['energy_max', 'energy_min', 'first_bad_step', 'status']
-    """
-
-    def begin(self) -> Reduction:
-        """A new reduction."""
-        return _Extremes(self)
-
-    def on_device(self, rows: Rows) -> Any:
-        """The device's form of the reduction."""
-        from ...device.reductions import Extremes as OnDevice
-
-        of = self.rows(rows)
-        return None if of is None else OnDevice(of)
-
-
 class _Extremes(Reduction):
     def __init__(self, outcome: Extremes) -> None:
-        self.outcome = outcome
+        super().__init__(outcome)
         self.least: list[Array] = []
         self.largest: list[Array] = []
 
@@ -237,42 +213,35 @@ class _Extremes(Reduction):
         return results
 
 
-class Mean(_Several):
-    """The mean over the observed time, ``y_mean``, by the trapezoidal rule over the observed states.
+class Extremes(_Several):
+    """The least and the largest value among the observed states, ``y_min`` and ``y_max``; NaN if a state was NaN.
 
-    Its error is at most (interval)²/12 times the largest second derivative of a smooth motion.
+    Between observed states the motion may go beyond: at a smooth extreme by (interval)²·|ÿ|/8 at most.
 
     Args:
         of: as for ``Crossing``; both blocks if None.
         name: the name of the results, in place of that of the quantity.
 
     Example:
-        >>> square = sw.sweeps.Mean(lambda t, v, y: y * y, name="square")
-        >>> axes = {"y": ("y0", [1.0, 2.0])}
-        >>> found = sw.sweep(sw.Oscillator(), axes, "rk4", v=0.0, dt=np.pi / 100, steps=200, outcomes=square)
-        >>> found.square_mean.values.round(6)
-        array([0.5, 2. ])
+        >>> outcome = sw.sweeps.Extremes("energy")
+        >>> found = sw.sweep(sw.Oscillator, {"omega": [1.0, 2.0]}, "rk4", v=0.0, y=1.0, dt=0.1, steps=100, outcomes=outcome)
+        >>> sorted(found.data_vars)
+        ['energy_max', 'energy_min', 'first_bad_step', 'status']
     """
 
-    def begin(self) -> Reduction:
-        """A new reduction."""
-        return _Mean(self)
+    reduction = _Extremes
 
     def on_device(self, rows: Rows) -> Any:
         """The device's form of the reduction."""
-        from ...device.reductions import Sums
+        from ...device.reductions import Extremes as OnDevice
 
         of = self.rows(rows)
-        return None if of is None else Sums(of)
-
-
-#: The most numbers of states that are summed in one call.
-NUMBERS_AT_ONCE = 1 << 16
+        return None if of is None else OnDevice(of)
 
 
 class _Mean(Reduction):
     def __init__(self, outcome: Mean) -> None:
-        self.outcome = outcome
+        super().__init__(outcome)
         self.sums: list[Array] = []
         self.before: list[Array] = []
         self.begin = self.t = np.nan
@@ -314,12 +283,39 @@ class _Mean(Reduction):
         return results
 
 
-def called(name: Any, of: Of | None) -> str | None:
-    """The user's name of results, or None.
+class Mean(_Several):
+    """The mean over the observed time, ``y_mean``, by the trapezoidal rule over the observed states.
 
-    Raises:
-        ArgumentError: if it is no name, or would be the name of two results, those of v and y.
+    Its error is at most (interval)²/12 times the largest second derivative of a smooth motion.
+
+    Args:
+        of: as for ``Crossing``; both blocks if None.
+        name: the name of the results, in place of that of the quantity.
+
+    Example:
+        >>> square = sw.sweeps.Mean(lambda t, v, y: y * y, name="square")
+        >>> axes = {"y": ("y0", [1.0, 2.0])}
+        >>> found = sw.sweep(sw.Oscillator(), axes, "rk4", v=0.0, dt=np.pi / 100, steps=200, outcomes=square)
+        >>> found.square_mean.values.round(6)
+        array([0.5, 2. ])
     """
+
+    reduction = _Mean
+
+    def on_device(self, rows: Rows) -> Any:
+        """The device's form of the reduction."""
+        from ...device.reductions import Sums
+
+        of = self.rows(rows)
+        return None if of is None else Sums(of)
+
+
+#: The most numbers of states that are summed in one call.
+NUMBERS_AT_ONCE = 1 << 16
+
+
+def called(name: Any, of: Of | None) -> str | None:
+    """The user's name of results, or None."""
     if name is None:
         return None
     if of is None:
@@ -329,29 +325,9 @@ def called(name: Any, of: Of | None) -> str | None:
     return name
 
 
-class History(ReducedOutcome):
-    """The states at intervals: ``v`` and ``y`` along the dimension ``t``; the interval is ``every`` of ``stepwell.sweep``.
-
-    With a tolerance, they are the states at the times of ``at``.
-
-    Where ``dt`` is an axis the dimension is ``saved``, and ``t`` a coordinate that depends on both.
-
-    Example:
-        >>> axes = {"omega": ("omega", [1.0, 2.0])}
-        >>> found = sw.sweep(sw.Oscillator, axes, "rk4", v=0.0, y=1.0, dt=0.1, steps=10, every=5)
-        >>> found.y.dims, found.t.values
-        (('omega', 't'), array([0. , 0.5, 1. ]))
-    """
-
-    observes = False
-
-    def begin(self) -> Reduction:
-        """A new reduction."""
-        return _History()
-
-
 class _History(Reduction):
-    def __init__(self) -> None:
+    def __init__(self, outcome: History) -> None:
+        super().__init__(outcome)
         self.pieces: list[Piece] = []
 
     def see(self, piece: Piece) -> None:
@@ -370,6 +346,24 @@ class _History(Reduction):
             )
             for block in _blocks(system)
         }
+
+
+class History(ReducedOutcome):
+    """The states at intervals: ``v`` and ``y`` along the dimension ``t``; the interval is ``every`` of ``stepwell.sweep``.
+
+    With a tolerance, they are the states at the times of ``at``.
+
+    Where ``dt`` is an axis the dimension is ``saved``, and ``t`` a coordinate that depends on both.
+
+    Example:
+        >>> axes = {"omega": ("omega", [1.0, 2.0])}
+        >>> found = sw.sweep(sw.Oscillator, axes, "rk4", v=0.0, y=1.0, dt=0.1, steps=10, every=5)
+        >>> found.y.dims, found.t.values
+        (('omega', 't'), array([0. , 0.5, 1. ]))
+    """
+
+    observes = False
+    reduction = _History
 
 
 class Function(Outcome):

@@ -21,11 +21,7 @@ REMEMBERED_TASKS = 4
 
 
 def packed(task: Task) -> bytes:
-    """Pickle a task for other processes.
-
-    Raises:
-        ArgumentError: if a part of it cannot be pickled.
-    """
+    """Pickle a task for other processes."""
     cloudpickle = need("cloudpickle")
 
     class Pickler(cloudpickle.Pickler):  # type: ignore[misc, name-defined]

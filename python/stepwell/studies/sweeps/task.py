@@ -402,11 +402,7 @@ def probed(task: Task, values: dict[str, Any]) -> Probed:
 
 
 def _by_cpu(request: Request) -> Request:
-    """The request for the CPU: for a few steps of one member no kernel is built, and the bits are the same.
-
-    Raises:
-        UnsupportedError: if its steps are too long for a kernel of the device.
-    """
+    """The request for the CPU: for a few steps of one member no kernel is built, and the bits are the same."""
     plan = request.plan._replace(device=None)
     if request.plan.device is not None:
         from ...device.bodies import takes  # only such sweeps need them

@@ -20,11 +20,7 @@ WIDER, HIGHER, LOWER = 1.8, 2.5, 12.0
 
 
 def draw(advice: Advice) -> Figure:
-    """Draw the ranked methods on a new figure.
-
-    Raises:
-        ArgumentError: if none is good enough.
-    """
+    """Draw the ranked methods on a new figure."""
     if not advice.ranked:
         why = " ".join(advice.summary())
         raise ArgumentError(f"plot: expected advice with a method that is good enough, got none to draw: {why}")

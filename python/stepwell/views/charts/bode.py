@@ -175,11 +175,7 @@ def bode(
         omega: frequencies in radians per unit of time, shape (n,), above zero, rising and at most π/dt; if None, 400 up to there.
         of: the output and the input, if there are several.
 
-    Returns:
-        A ``Bode``.
-
     Raises:
-        ArgumentError: what was given and what was expected.
         UnsupportedError: if no method can step the system, or it is not linear.
 
     Example:

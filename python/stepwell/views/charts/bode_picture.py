@@ -74,7 +74,6 @@ def draw(chart: Bode) -> Figure:
 
 
 def _left(chart: Bode) -> float:
-    """The least share of π/dt that is drawn."""
     return float(chart.omega[0] / chart.nyquist)
 
 

@@ -67,7 +67,6 @@ def draw_table(axes: Axes, panel: Panel, error: str) -> None:
 
 
 def _fits(text: str, room: float) -> bool:
-    """True if a text fits into so many points."""
     return (max(len(line) for line in text.split("\n")) * LETTER + BESIDE) * SIZE <= room
 
 

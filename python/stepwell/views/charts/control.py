@@ -71,7 +71,6 @@ class ControlSweep(Drawn, Table, ValueEquality):
         """The line of that method and kind, with this number of evaluations; the first number if None.
 
         Raises:
-            UnknownNameError: if there is no such line.
             ArgumentError: if there are no runs with this number of evaluations.
         """
         name = find_method(method).name
@@ -190,9 +189,6 @@ def control(
 
     Returns:
         A ``ControlSweep``. Methods that cannot be controlled are in its ``refused``, with the reason.
-
-    Raises:
-        ArgumentError: what was given and what was expected.
 
     Example:
         >>> chart = sw.charts.control("energy_control", ["standard_euler"], relative=[0.1, 0.3], evaluations=[500], horizon=5.0)

@@ -103,12 +103,10 @@ def _swept(chart: ControlSweep) -> list[Method]:
 
 
 def _look(chart: ControlSweep, method: Method) -> dict[str, Any]:
-    """Each method has a colour of its own."""
     return apart(_methods(chart), method)
 
 
 def _methods(chart: ControlSweep) -> list[Method]:
-    """The methods, each once."""
     return list({line.method.name: line.method for line in chart.lines}.values())
 
 

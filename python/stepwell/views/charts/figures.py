@@ -141,7 +141,6 @@ class Figures(Table, ValueEquality):
             method: a method's name for its own figure; None for all in one.
 
         Raises:
-            ArgumentError: if that method is not here.
             UnsupportedError: if matplotlib is missing.
         """
         if method is None:
@@ -157,7 +156,6 @@ class Figures(Table, ValueEquality):
         """Draw the harmonic cases of §4, and write the picture to ``path`` if given.
 
         Raises:
-            ArgumentError: if they are not here.
             UnsupportedError: if matplotlib is missing.
         """
         if not self.harmonic:
@@ -173,7 +171,6 @@ class Figures(Table, ValueEquality):
             folder: the folder, which is created if it does not exist.
 
         Raises:
-            ArgumentError: if nothing can be written there.
             UnsupportedError: if matplotlib is missing.
         """
         from ...base.pictures import new_figure
@@ -225,12 +222,6 @@ def figures(methods: Iterable[Method | str] | None = None, *, phi: float = 0.5, 
         methods: names, or what ``stepwell.method`` returns; all if None.
         phi: Φ = ω₀·dt, the true angle per step, in radians, above zero and at most 100.
         periods: how many periods of the exact solution to cover, above zero; the last step goes to its end or past it.
-
-    Returns:
-        A ``Figures``.
-
-    Raises:
-        ArgumentError: what was given and what was expected.
 
     Warns:
         DivergenceWarning: if samples leave the finite numbers.

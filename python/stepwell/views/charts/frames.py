@@ -31,13 +31,9 @@ BITS = 5
 
 
 class Frames:
-    """The frames of a figure, of which only the animated artists are drawn anew.
+    """The frames of a figure, one for each saved state, of which only the ``animated`` artists are drawn anew.
 
-    Args:
-        figure: the figure; what moves on it is ``animated``.
-        show: shows a saved state on it.
-        states: the saved states, one for each frame.
-        progress: called with the share that is done.
+    ``show`` shows a state on the figure; ``progress`` is called with the share that is done.
     """
 
     def __init__(
@@ -106,7 +102,6 @@ def _image(codes: Pixels, colours: Pixels, before: Pixels | None) -> Any:
 
 
 def _gif(images: Iterable[Any], colours: int, rate: float = 1.0) -> bytes:
-    """The bytes of a .gif of these frames."""
     rest, written = iter(images), BytesIO()
     first = next(rest)
     options: dict[str, Any] = {"duration": round(1000.0 / rate), "loop": 0, "transparency": colours, "disposal": 1}
@@ -140,11 +135,7 @@ def _palette(samples: Sequence[Pixels], number: int) -> tuple[Pixels, Pixels]:
 
 
 def write_mp4(frames: Frames, path: Path, rate: float) -> None:
-    """Write an .mp4 by the program ffmpeg.
-
-    Raises:
-        UnsupportedError: with its message, if ffmpeg fails.
-    """
+    """Write an .mp4 by the program ffmpeg."""
     from matplotlib.animation import FFMpegWriter
 
     height, width = frames.frame(frames.states[0]).shape[:2]

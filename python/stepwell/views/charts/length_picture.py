@@ -81,7 +81,6 @@ def _column(panels: Any, chart: ControlSweep, evaluations: int, strip: float) ->
 
 
 def _look(chart: ControlSweep, method: Method) -> dict[str, Any]:
-    """Each method has a colour of its own."""
     return apart([line.method for line in _firsts(chart)], method)
 
 
@@ -132,7 +131,6 @@ def _legend(figure: Figure, chart: ControlSweep) -> None:
 
 
 def _firsts(chart: ControlSweep) -> list[Held]:
-    """The first line of each method."""
     firsts: dict[str, Held] = {}
     for line in chart.lines:
         firsts.setdefault(line.method.name, line)

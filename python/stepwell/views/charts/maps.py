@@ -104,12 +104,6 @@ class StabilityMap(Table, ValueEquality):
 
         Args:
             steps: N, how many steps are made.
-
-        Returns:
-            An ``Observation``.
-
-        Raises:
-            ArgumentError: if there are no steps.
         """
         steps = checks.count("steps", steps, 1)
         norms = self.nonnormal[self.stable]
@@ -224,11 +218,7 @@ def stability_map(
             oscillator over Φ alone, which every method can step.
         size: number of points over each axis, or a pair: over Φ, over D.
 
-    Returns:
-        A ``StabilityMap``.
-
     Raises:
-        ArgumentError: what was given and what was expected.
         UnsupportedError: if the method cannot step a damped oscillator.
 
     Example:
@@ -286,7 +276,6 @@ def _fitted(method: Method, damping: tuple[float, float] | None) -> float:
 
 
 def _ends(argument: str, value: Any, unit: str) -> tuple[float, float]:
-    """The two ends of an axis."""
     ends = checks.numbers(argument, value, unit=unit)
     if ends.shape != (2,):
         raise ShapeError(f"{argument}: expected two numbers, from where to where, got an array of shape {ends.shape}")

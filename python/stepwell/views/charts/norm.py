@@ -126,11 +126,7 @@ def norm(
         gains: h·k of the control, shape (gains,), without a unit.
         progress: a function that is called with the fraction that is done.
 
-    Returns:
-        A ``NormSweep``.
-
     Raises:
-        ArgumentError: what was given and what was expected.
         UnsupportedError: if a method cannot step a rigid body.
 
     Example:

@@ -88,7 +88,6 @@ def _ratio(line: Settled) -> Any:
 
 
 def _norms(axes: Axes, chart: NormSweep) -> None:
-    """Where the norm settles."""
     errors = [np.maximum(np.abs(line.norm_error), LEAST_NORM) for line in chart.lines]
     for line, error in zip(chart.lines, errors, strict=True):
         _line(axes, line, error)
@@ -127,7 +126,6 @@ def _labels(axes: Axes, chart: NormSweep, values: list[Any], names: list[str]) -
 
 
 def _gain(axes: Axes, chart: NormSweep) -> None:
-    """The common axis."""
     axes.set(xscale="log", yscale="log", xlabel="gain h·k, without a unit")
     gains = np.concatenate([line.gains for line in chart.lines])
     if gains.min() < gains.max():

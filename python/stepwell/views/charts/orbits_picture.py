@@ -223,7 +223,6 @@ def fixed(axes: Axes, view: Points) -> None:
 
 
 def _paths(axes: Axes, chart: RunPicture, view: Points) -> None:
-    """Draw the path of each point, with its start and its end."""
     y, bodies = view.places, view.places.shape[1]
     fixed(axes, view)
     joined = chart.links

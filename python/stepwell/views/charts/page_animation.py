@@ -137,7 +137,6 @@ def _orbits(chart: RunPicture, shown: Array) -> list[Panel]:
 
 
 def _swing(chart: RunPicture, shown: Array) -> list[Panel]:
-    """Coordinate and velocity as curves that grow."""
     panels, exact = swings(chart), chart.exact_at(shown)
     height = 0.4 if len(panels) > 1 else 0.88
     return [
@@ -147,7 +146,6 @@ def _swing(chart: RunPicture, shown: Array) -> list[Panel]:
 
 
 def _rows(chart: RunPicture, shown: Array) -> list[Panel]:
-    """The coordinates side by side."""
     values, size = side_by_side(chart)
     exact = chart.exact_at(shown)
     panel = {
@@ -163,7 +161,6 @@ def _rows(chart: RunPicture, shown: Array) -> list[Panel]:
 
 
 def _aircraft(chart: RunPicture, shown: Array) -> list[Panel]:
-    """An aircraft in space, and its angles."""
     places = [(0.6, 0.06 + 0.32 * k, 0.38, 0.24) for k in range(3)]
     panels = zip(angles(chart), places, tuple(FAMILIES.values())[1:], strict=False)
     return [_solid(chart, shown), *(_series(chart, series, shown, place, colour) for series, place, colour in panels)]

@@ -41,7 +41,6 @@ class Panel(Drawn, Table, ValueEquality):
         """Draw the scenes beside each other, and write the picture to ``path`` if given; ``error`` as of ``WorkPrecision.plot``.
 
         Raises:
-            ArgumentError: if there is no such error or format.
             UnsupportedError: if matplotlib is missing.
         """
         return drawn(path, lambda: self.draw(error))
@@ -73,9 +72,6 @@ def panel(scenes: Iterable[Scene | str], *, progress: Callable[[float], object] 
         scenes: scenes, or their names.
         progress: a function that is called with the fraction that is done.
         **options: arguments of ``work_precision``: ``methods``, ``steps``, ``tolerances``, ``peers``.
-
-    Raises:
-        ArgumentError: what was given and what was expected.
 
     Example:
         >>> chart = sw.charts.panel(["oscillator"], methods=["leapfrog"], steps=[500, 1000], tolerances=[])

@@ -69,7 +69,6 @@ def draw(panel: Panel, error: str) -> Figure:
 
 
 def _curves(axes: Axes, chart: WorkPrecision, kind: str, *, named: bool) -> None:
-    """The curves of one scene."""
     draw_errors(axes, chart, kind, "evaluations")
     for line in axes.lines:
         line.set_markersize(0.75 * line.get_markersize())

@@ -221,7 +221,6 @@ def _wrong(strip: Axes, chart: WorkPrecision, cost: str) -> None:
 
 
 def _at_edge(curve: Curve, cost: str) -> float:
-    """The cost of the largest stable step."""
     if cost == "evaluations":
         assert isinstance(curve.method, Method)
         point = curve.points[0]

@@ -183,7 +183,6 @@ class RunPicture(Drawn, Table, ValueEquality):
             progress: a function that is called with the share of the frames that are drawn, from 0 to 1; a page has none.
 
         Raises:
-            ArgumentError: what was given and what was expected.
             UnsupportedError: for .gif and .mp4, if matplotlib is missing; for .mp4, if ffmpeg is.
         """
         registry.task("animate_run")(self, path, seconds, fps, progress)
@@ -223,9 +222,6 @@ def run_picture(scene: Scene | str, run: Run) -> RunPicture:
         scene: the ``Scene`` that was run, or its name.
         run: what ``scene.run(…, every=…)`` returned, with two states or more.
 
-    Returns:
-        A ``RunPicture``.
-
     Raises:
         ArgumentError: if the run is not of that scene, or keeps too little.
 
@@ -249,11 +245,7 @@ def run_picture(scene: Scene | str, run: Run) -> RunPicture:
 
 
 def own_picture(run: Run) -> RunPicture:
-    """The picture of a run on its own, without an exact solution: a scene is made of its system and its first saved state.
-
-    Raises:
-        ArgumentError: if the run is of a batch, or too little was saved.
-    """
+    """The picture of a run on its own, without an exact solution: a scene is made of its system and its first saved state."""
     if run.status.ndim:
         raise ArgumentError(f"run: expected a run of one member, got a batch of shape {run.status.shape}; integrate one of them")
     if len(run.t) < 2:
@@ -298,7 +290,6 @@ def _energy_error(scene: Scene, run: Run) -> tuple[Array | None, str]:
 
 
 def _largest_kinetic(scene: Scene, run: Run, energy: Array) -> float:
-    """The largest kinetic energy of the saved states."""
     places = np.moveaxis(run.y, 0, -1)
     with np.errstate(all="ignore"):
         kinetic = energy - np.asarray(scene.system.energy(np.zeros((*scene.v.shape, 1)), places))
@@ -311,7 +302,6 @@ def _of_points(y: Array) -> Array:
 
 
 def _largest(error: Array | None) -> float | None:
-    """The largest that is known, or None."""
     if error is None or np.isnan(error).all():
         return None
     return float(np.nanmax(error))

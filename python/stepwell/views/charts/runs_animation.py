@@ -51,12 +51,7 @@ Motion = tuple[Show, list[Any], list[Axes]]
 
 
 def need(path: str | Path, seconds: float, fps: float) -> tuple[float, float]:
-    """Raise if no such animation can be written, before any work is done; or return its seconds and frames a second.
-
-    Raises:
-        ArgumentError: if the ending is not that of an animation, or its length cannot be.
-        UnsupportedError: naming what is missing.
-    """
+    """Raise if no such animation can be written, before any work is done; or return its seconds and frames a second."""
     seconds = checks.number("seconds", seconds, positive=True, unit="seconds")
     fps = checks.number("fps", fps, positive=True, unit="frames a second")
     if seconds * fps > MOST_FRAMES:
@@ -205,7 +200,6 @@ def _swing(figure: Figure, chart: RunPicture) -> Motion:
 
 
 def _rows(figure: Figure, chart: RunPicture) -> Motion:
-    """The coordinates side by side."""
     values, size = side_by_side(chart)
     n = values.shape[1]
     numbers = np.arange(1, n + 1)

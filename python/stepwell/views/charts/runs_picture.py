@@ -92,7 +92,6 @@ def _legend(axes: Axes, chart: RunPicture) -> None:
 
 
 def _phase_plane(axes: Axes, chart: RunPicture) -> None:
-    """The velocity over the coordinate, with start and end."""
     y, v = (np.clip(block[chart.finite], -LARGEST, LARGEST) for block in (chart.run.y, chart.run.v))
     axes.plot(y, v, color="black", linewidth=1.1, rasterized=len(y) > LONG_CURVE)
     for i, face in ((0, "white"), (-1, "black")):
@@ -104,7 +103,6 @@ def _phase_plane(axes: Axes, chart: RunPicture) -> None:
 
 
 def _rows(figure: Figure, chart: RunPicture, width: float) -> list[str]:
-    """Each coordinate over time on a line of its own, one above the other."""
     axes = figure.add_axes((0.065, BOTTOM, width, TOP - BOTTOM))
     good = chart.finite
     y = np.clip(chart.run.y[good].reshape(int(good.sum()), -1), -LARGEST, LARGEST)

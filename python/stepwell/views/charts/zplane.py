@@ -121,7 +121,6 @@ class Stability(Table, ValueEquality):
             kind: ``"loci"``: the eigenvalues in the z-plane; ``"curves"``: r₁² and Ψ/Φ over Φ.
 
         Raises:
-            UnknownNameError: if there is no such kind.
             UnsupportedError: if matplotlib is missing.
         """
         kind = checks.known("kind", kind, KINDS)
@@ -153,12 +152,6 @@ def stability(methods: Iterable[Method | str] | None = None, *, phi: Any = None)
         methods: names, or what ``stepwell.method`` returns; all if None.
         phi: angles Φ = ω₀·dt in radians, above zero, at most 100 and rising, shape (n,); if None, 200 in each unit of Φ up to
             past the largest limit.
-
-    Returns:
-        A ``Stability``.
-
-    Raises:
-        ArgumentError: what was given and what was expected.
 
     Example:
         >>> chart = sw.charts.stability(["rk4"])

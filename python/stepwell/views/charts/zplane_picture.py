@@ -85,7 +85,6 @@ def loci(chart: Stability) -> Figure:
 
 
 def _plane(axes: Axes) -> None:
-    """The unit circle and the guides."""
     from matplotlib.patches import Circle
 
     axes.add_patch(Circle((0.0, 0.0), 1.0, facecolor="#f0f0f0", edgecolor="#999999", linewidth=1.0, zorder=0))

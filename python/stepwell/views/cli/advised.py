@@ -30,11 +30,7 @@ NO_BUDGET = 1e9
 def advised(scene: Scene, progress: Callable[[float], object] | None, *, by: str | None) -> tuple[Row | None, str]:
     """The cheapest row that is accurate enough, and why it is taken, in words; None where there is no advice.
 
-    Args:
-        scene: the scene.
-        progress: called with the share of the search that is done.
-        by: ``"step"`` for fixed steps only, ``"tolerance"`` for adaptive ones, None for either.
-
+    ``by`` is ``"step"`` for fixed steps only, ``"tolerance"`` for adaptive ones, None for either.
     """
     methods = METHODS if scene.v.size + scene.y.size <= MOST_IMPLICIT else METHODS[:-1]
     rows: list[Row] = []

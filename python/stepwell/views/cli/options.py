@@ -35,11 +35,7 @@ def methods(parser: argparse.ArgumentParser, default: str = "all") -> None:
 
 
 def chosen(args: argparse.Namespace) -> list[Method] | None:
-    """The methods named on the command line; None for the default.
-
-    Raises:
-        UnknownNameError: if there is no method of a name.
-    """
+    """The methods named on the command line; None for the default."""
     words = args.methods.split(",") if isinstance(args.methods, str) else args.methods
     return [find_method(word.strip()) for word in words] if words else None
 

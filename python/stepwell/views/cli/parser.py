@@ -24,11 +24,7 @@ class Parser(argparse.ArgumentParser):
 
 
 def number(text: str) -> float:
-    """Parse a number.
-
-    Raises:
-        argparse.ArgumentTypeError: if the text is no number.
-    """
+    """Parse a number."""
     try:
         return float(text)
     except ValueError:
@@ -36,11 +32,7 @@ def number(text: str) -> float:
 
 
 def whole(text: str) -> int:
-    """Parse a whole number, such as 1000 or 1e3.
-
-    Raises:
-        argparse.ArgumentTypeError: if the text is no whole number.
-    """
+    """Parse a whole number, such as 1000 or 1e3."""
     try:
         return int(text)
     except ValueError:

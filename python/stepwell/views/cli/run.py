@@ -145,14 +145,12 @@ def _advise(args: argparse.Namespace, chosen: Scene) -> str:
 
 
 def _colour(verdict: str) -> str:
-    """The colour of a verdict."""
     if verdict.startswith("bounded; "):
         return show.GOOD
     return show.DOUBTFUL if verdict.startswith("bounded") else "" if verdict == UNKNOWN else show.BAD
 
 
 def _fixed(args: argparse.Namespace, chosen: Scene, to_draw: bool, options: dict[str, Any]) -> Run:
-    """Run with fixed steps."""
     dt = chosen.dt if args.dt is None else args.dt
     steps = chosen.steps_for(dt) if args.steps is None else args.steps
     every = max(1, steps // (SAVED_TO_DRAW if to_draw else SAVED)) if args.every is None else args.every

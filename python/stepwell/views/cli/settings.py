@@ -23,9 +23,6 @@ def scene_with(name: str, settings: Sequence[str]) -> Scene:
 
     An argument of the scene is changed as by ``scene:NAME=VALUE``, so its exact solution changes with it. Other settings change
     the system or the start; the exact solution is then unknown.
-
-    Raises:
-        ArgumentError: if a text is not NAME=VALUE, or neither the scene nor its system has such a name.
     """
     pairs = [_pair(text) for text in settings]
     known = () if FILE.fullmatch(name) else _arguments_of(name.partition(":")[0])

@@ -69,11 +69,7 @@ def of_method(method: Method) -> dict[str, Any]:
 
 
 def of_scene(scene: Scene, methods: Sequence[Method]) -> dict[str, Any]:
-    """The data of a scene for the page.
-
-    Raises:
-        UnsupportedError: if none of the methods can step it, or its steps are too long for a page.
-    """
+    """The data of a scene for the page."""
     known = built_in(scene)
     offer = sliders.OFFERS[scene.name] if known else sliders.Offer()
     size, finite = sizes(scene)
@@ -158,7 +154,6 @@ def _sources(
 
 
 def _source(scene: Scene, method: Method, control: AnyControl | None) -> str:
-    """A step as JavaScript."""
     options: dict[str, Any] = {"dt": scene.dt, "v": scene.v, "y": scene.y, "control": control}
     numbers = scene.v.size + scene.y.size
     if method.is_implicit and numbers > MAX_UNKNOWNS:

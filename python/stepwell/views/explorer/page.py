@@ -59,7 +59,6 @@ def explore(scenes: Any = None, *, methods: Any = None) -> Explorer:
         An ``Explorer``: ``.save(path)`` writes the page, ``.open()`` shows it in the browser; a notebook shows it by itself.
 
     Raises:
-        ArgumentError: what was given and what was expected.
         UnsupportedError: if no method steps one of the scenes, or its steps are too long for a page.
 
     Example:
@@ -137,12 +136,6 @@ class Explorer(ValueEquality):
 
         Args:
             path: the file, ending in ``.html`` or ``.htm``.
-
-        Returns:
-            The path.
-
-        Raises:
-            ArgumentError: if it has another ending or cannot be written.
         """
         place = paths.file("path", path, (".html", ".htm"))
         files.write_text(place, self.html)
@@ -160,7 +153,6 @@ class Explorer(ValueEquality):
         return Path(file.name)
 
     def _repr_html_(self) -> str:
-        """The page in a frame, for a notebook."""
         inside = html.escape(self.html, quote=True)
         style = f"width:100%;height:{NOTEBOOK_HEIGHT}px;border:1px solid #8888"
         return f'<iframe title="stepwell explorer" style="{style}" srcdoc="{inside}"></iframe>'

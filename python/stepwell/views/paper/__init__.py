@@ -36,7 +36,6 @@ class Finding(NamedTuple):
     numbers: str
 
     def _repr_html_(self) -> str:
-        """The result as a table, for notebooks."""
         return facts("Checked", [("holds", "yes" if self.holds else "no"), ("numbers", self.numbers)])
 
 
@@ -67,7 +66,6 @@ class Entry(NamedTuple):
         return shortened(f"<Hoffmann (2002), {self.section}, {self.kind}: {self.says}>", MAX_LINE)
 
     def _repr_html_(self) -> str:
-        """The statement as a table, for notebooks."""
         pairs = [("kind", self.kind), ("statement", self.says), ("correction", self.corrected), ("in stepwell", self.here)]
         return facts(f"Hoffmann (2002), {self.section}", [*pairs, ("picture", self.picture)])
 
@@ -118,9 +116,6 @@ def entries(section: str | None = None) -> tuple[Entry, ...]:
     Returns:
         An ``Entry`` for each.
 
-    Raises:
-        ArgumentError: if there is no such section.
-
     Example:
         >>> [entry.kind for entry in sw.paper.entries("§5")]
         ['algorithm', 'formula', 'figure']
@@ -150,10 +145,6 @@ def draw(folder: str | Path, section: str | None = None) -> list[Path]:
 
     Returns:
         The paths, in the order of Hoffmann (2002).
-
-    Raises:
-        ArgumentError: if nothing can be written there, or there is no such section, or it has no figure.
-        UnsupportedError: if matplotlib is missing.
     """
     from ...base.pictures import new_figure
 

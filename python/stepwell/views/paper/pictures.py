@@ -27,14 +27,9 @@ def motion(name: str, **options: Any) -> Callable[[Path], object]:
 
 
 def paths(path: Path, title: str, about: str, panels: Sequence[tuple[str, Array]], reach: float) -> object:
-    """Draw paths of bodies in the plane, in panels side by side with the same scale.
+    """Draw paths of bodies in the plane into a file, in panels side by side of the same scale, up to ``reach`` on each side.
 
-    Args:
-        path: the file to write.
-        title: the title of the picture.
-        about: the line below it: method, steps and forces.
-        panels: for each panel its title and the positions, shape (saved, bodies, 2).
-        reach: half the width of a panel, in units of length.
+    A panel is its title and the positions, shape (saved, bodies, 2); ``about`` is the line below the title.
     """
 
     def draw() -> Figure:
