@@ -51,6 +51,9 @@ class EnergyControl(OfEnergy):
         relative: in place of C, the dimensionless h·C·K at the start: a step removes twice that fraction of ΔE. Broadcasts.
         target: the energy to keep; that of the start if None. Broadcasts.
 
+    Raises:
+        ArgumentError: if an argument is wrong.
+
     Example:
         >>> bodies = sw.scenes.energy_control()
         >>> run = bodies.run("standard_euler", steps=300, control=sw.EnergyControl(0.3))
@@ -124,6 +127,9 @@ class Control(Immutable, ValueEquality):
         form: ``"limited"`` uses gain/(1 + h·gain), as backward Euler would, which never overshoots; ``"printed"`` uses gain
             itself, and overshoots where h·gain is above 1. With adaptive steps the first depends on their lengths.
         target: the value to keep; that of the start if None. Broadcasts.
+
+    Raises:
+        ArgumentError: if an argument is wrong.
 
     Example:
         >>> @sw.system
@@ -205,6 +211,9 @@ class LengthControl(ConstraintControl):
     Args:
         c: α·h = β·h, without a unit, zero or more; broadcasts over the batch.
 
+    Raises:
+        ArgumentError: what is wrong with ``c``.
+
     Example:
         >>> rods = sw.scenes.double_pendulum()
         >>> run = rods.run("rk4", steps=100, control=sw.LengthControl(0.5))
@@ -226,6 +235,9 @@ class NormControl(ConstraintControl):
 
     Args:
         k: in 1 per unit of time, zero or more; broadcasts over the batch.
+
+    Raises:
+        ArgumentError: what is wrong with ``k``.
 
     Example:
         >>> body = sw.scenes.dzhanibekov()
@@ -254,6 +266,9 @@ class Projection(OfEnergy):
     Args:
         way: ``"scaling"``, ``"nacozy"``, the name of an invariant, or the constraint of a system.
         target: the energy to keep; that of the start if None. Broadcasts over the batch.
+
+    Raises:
+        ArgumentError: if an argument is wrong.
 
     Example:
         >>> bodies = sw.scenes.energy_control()

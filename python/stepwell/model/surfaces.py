@@ -119,6 +119,9 @@ class Floor(Surface):
         way: how points bounce; see the table.
         omega: ω of the spring in rad per unit of time, its stiffness per mass being ω²; with ``way="spring"`` only. Broadcasts.
 
+    Raises:
+        ArgumentError: if an argument is wrong.
+
     Example:
         >>> sw.Particles(floor=sw.Floor(restitution=0.8))
         Particles(masses=1.0, gravity=9.81, floor=Floor(offset=0.0, restitution=0.8, way='safe'))
@@ -168,6 +171,9 @@ class Sphere(Surface):
         friction: Coulomb's coefficient, as of ``Floor``.
         way: the way of contact, as of ``Floor``.
         omega: ω of the spring, as of ``Floor``.
+
+    Raises:
+        ArgumentError: if an argument is wrong.
 
     Example:
         >>> sw.Particles(floor=sw.Sphere((0.0, 0.0), 1.0, inside=True))

@@ -67,6 +67,9 @@ class Scene(ValueEquality):
     Two scenes are equal if all of these are. A scene can be pickled and copied if its ``exact`` can: those of the built-in scenes
     can, a lambda cannot.
 
+    Raises:
+        ArgumentError: what was given and what was expected.
+
     Example:
         >>> scene = Scene(sw.Pendulum(), v=0.0, y=2.0, horizon=20.0)
         >>> sw.advise(scene, frame=None, tolerance=1e-3, methods=["leapfrog", "rk4"], cost="evaluations")

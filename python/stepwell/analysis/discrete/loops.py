@@ -133,6 +133,9 @@ def sampling_limit(plant: Any, controller: Any, *, delay: float = 0.0, samples: 
         The limit in units of time: 0 if the loop is not stable with the shortest samples, a thousandth of the shortest time
         constant and 0.003 of the dead time; infinity if it is with samples of a thousand times the longest time constant.
 
+    Raises:
+        ArgumentError: if an argument is wrong.
+
     Example:
         >>> integrator = sw.TransferFunction(1.0, [1.0, 0.0])
         >>> round(sw.sampling_limit(integrator, 4.0), 9)  # 1 − 4·dt leaves the circle at −1

@@ -39,6 +39,9 @@ def frequency_response(system: Any, omega: Any) -> Complex:
     Returns:
         Complex numbers, shape (*frequencies, *batch); of several inputs or outputs (*frequencies, r, m, *batch).
 
+    Raises:
+        ArgumentError: if an argument is wrong.
+
     Example:
         >>> lag = sw.TransferFunction(1.0, [1.0, 1.0])
         >>> sw.frequency_response(lag, 1.0).round(6)

@@ -194,6 +194,9 @@ class DiscreteSystem(ValueEquality):
 
         Returns:
             Complex numbers, shape (*frequencies, *batch); of several inputs or outputs (*frequencies, r, m, *batch).
+
+        Raises:
+            ArgumentError: if ``omega`` is no such array.
         """
         omega = checks.numbers("omega", omega, unit="rad per unit of time")
         z = np.exp(1j * self.dt * omega)
@@ -210,6 +213,9 @@ class DiscreteSystem(ValueEquality):
 
         Returns:
             A ``SampledRun`` of as many samples.
+
+        Raises:
+            ArgumentError: if an argument has a wrong shape.
         """
         samples, (n, m) = checks.numbers("x", x), self.Q.shape[:2]
         if m == 1 and samples.ndim:

@@ -164,6 +164,9 @@ def of_state(mu: Any, v: Any, y: Any, *, t: Any = 0.0) -> Elements:
     Returns:
         The elements, shape (*batch).
 
+    Raises:
+        ArgumentError: if an argument is wrong.
+
     Example:
         >>> orbit = sw.orbits.of_state(1.0, v=[0.0, 1.2], y=[1.0, 0.0])
         >>> float(orbit.e.round(12)), float(orbit.apoapsis.round(6))

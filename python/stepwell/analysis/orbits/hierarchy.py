@@ -222,6 +222,9 @@ def jacobi(masses: Any, block: Any) -> Array:
     Returns:
         The block of the same shape.
 
+    Raises:
+        ArgumentError: if an argument is wrong.
+
     Example:
         >>> sw.orbits.jacobi([1.0, 1.0, 1.0], [[0.0, 0.0], [1.0, 0.0], [2.0, 0.0]])
         array([[1. , 0. ],
@@ -247,6 +250,9 @@ def inertial(masses: Any, block: Any) -> Array:
 
     Returns:
         The block of the same shape.
+
+    Raises:
+        ArgumentError: if an argument is wrong.
 
     Example:
         >>> sw.orbits.inertial([1.0, 1.0, 1.0], [[1.0, 0.0], [1.0, 0.0], [1.5, 0.0]])

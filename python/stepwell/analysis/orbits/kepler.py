@@ -51,6 +51,9 @@ def eccentric_anomaly(mean_anomaly: Any, e: Any) -> Array:
     Returns:
         E, D or F, of an ellipse in the same revolution as M.
 
+    Raises:
+        ArgumentError: if an argument is wrong.
+
     Example:
         >>> sw.orbits.eccentric_anomaly(np.pi / 2, [0.0, 0.5, 0.99])
         array([1.57079633, 2.02097994, 2.30544318])

@@ -28,6 +28,9 @@ def gravity(length: Any = "au", mass: Any = "solar", time: Any = "year") -> floa
     Returns:
         G in length³/(mass·time²).
 
+    Raises:
+        ArgumentError: if there is no such unit.
+
     Example:
         >>> round(sw.orbits.gravity("au", "solar", "year"), 9)
         39.476926409

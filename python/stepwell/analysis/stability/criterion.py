@@ -160,6 +160,9 @@ def criteria(methods: Iterable[Method | str] | None = None, *, phi: Any = PHI) -
     Returns:
         A ``Criteria``: a tuple of ``Criterion``.
 
+    Raises:
+        ArgumentError: what was given and what was expected.
+
     Example:
         >>> for answer in sw.criteria(["false_euler", "rk4"]):
         ...     print(answer)

@@ -64,6 +64,9 @@ class Aircraft(OwnSystem):
         form: as given.
         controllers: as given.
 
+    Raises:
+        ArgumentError: if an argument is wrong.
+
     Example:
         >>> aircraft = sw.Aircraft(roll=30.0)
         >>> run = sw.integrate(aircraft, "false_euler", v=0.0, y=0.0, dt=0.1, steps=600)
@@ -147,6 +150,9 @@ class Aircraft(OwnSystem):
 
         Returns:
             The angle in degrees, shape (times, *batch); NaN without controllers.
+
+        Raises:
+            ArgumentError: if an argument is wrong.
         """
         name, times = checks.known("name", name, ("roll", "pitch")), checks.numbers("t", t, unit="units of time")
         if times.ndim != 1:
@@ -226,6 +232,9 @@ class Aircraft(OwnSystem):
         Returns:
             The angles, shape (3, *batch), or the quaternion of length 1, shape (4, *batch).
 
+        Raises:
+            ArgumentError: if an argument is wrong.
+
         Example:
             >>> sw.Aircraft("quaternion").attitude(pitch=180.0).round(3)
             array([0., 0., 1., 0.])
@@ -246,6 +255,9 @@ class Aircraft(OwnSystem):
 
         Returns:
             Angles from −180 to 180 in place of the numbers of a state. Those of a quaternion have the pitch from −90 to 90.
+
+        Raises:
+            ArgumentError: if an argument is wrong.
 
         Example:
             >>> roll, pitch, yaw = aircraft.angles(run.y[-1])
@@ -270,6 +282,9 @@ class Aircraft(OwnSystem):
         Returns:
             Matrices along the first two axes, shape (3, 3, *other axes of y). Their columns are the axes of the aircraft, which
             point forward, to the left and up.
+
+        Raises:
+            ArgumentError: if an argument is wrong.
         """
         block, _ = self._block(y, axis)
         with np.errstate(all="ignore"):

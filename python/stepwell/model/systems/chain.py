@@ -25,6 +25,9 @@ class Chain(System):
             and the batch along the others. A first or last spring of stiffness 0 leaves that end of the chain free.
         mass: the masses, likewise, with n (or 1) along the first axis.
 
+    Raises:
+        ArgumentError: if an argument is wrong.
+
     Example:
         >>> chain = sw.Chain(3, stiffness=2.0, mass=1.0)
         >>> run = sw.integrate(chain, "leapfrog", v=0.0, y=[1.0, 0.0, 0.0], dt=0.1, steps=10)

@@ -51,6 +51,9 @@ class LinearSystem(System):
         second_order: whether ẏ is v times a number, so that Verlet can step it if no row of v depends on v.
         input_names: ``("x",)`` for one input, ``("x[0]", "x[1]", …)`` for several.
 
+    Raises:
+        ArgumentError: if an argument is wrong.
+
     Example:
         >>> mass = sw.LinearSystem([[-0.2, -4.0], [1.0, 0.0]], B=[1.0, 0.0], x=1.0)  # states: velocity, position
         >>> run = sw.integrate(mass, "rk4", v=0.0, y=0.0, dt=0.05, steps=2000)
@@ -262,12 +265,20 @@ class LinearSystem(System):
         return f"B[{order[row]},{self._columns()[column - len(order)]}]"
 
     def split(self, state: Any) -> tuple[Array, Array]:
-        """The blocks (v, y) of a state in the order of A, shape (n, *batch)."""
+        """The blocks (v, y) of a state in the order of A, shape (n, *batch).
+
+        Raises:
+            ArgumentError: if the state is wrong.
+        """
         array = checks.block("state", state, (len(self.A),), self.axes)
         return array[list(self.velocities)], array[list(self.coordinates)]
 
     def state(self, v: Any, y: Any) -> Array:
-        """The state in the order of A, shape (n, *batch), of the blocks v and y: undoes ``split``."""
+        """The state in the order of A, shape (n, *batch), of the blocks v and y: undoes ``split``.
+
+        Raises:
+            ArgumentError: if a block is wrong.
+        """
         v = checks.block("v", v, self.v_shape, self.axes, finite=False)
         y = checks.block("y", y, self.y_shape, self.axes, finite=False)
         batch = checks.batch_shape({"v": v.shape[1:], "y": y.shape[1:]})

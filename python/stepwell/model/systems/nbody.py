@@ -47,6 +47,9 @@ class NBody(System):
         massless: the numbers of the bodies without mass, which no other body meets for their sake; in an array of masses for each
             member there are none, for whether a body has mass decides the operations of a step.
 
+    Raises:
+        ArgumentError: if an argument is wrong.
+
     Example:
         >>> sun_and_planet = sw.NBody([1.0, 1e-3], force="newton", G=1.0)
         >>> v, y = [[0.0, 0.0], [0.0, 1.0]], [[0.0, 0.0], [1.0, 0.0]]

@@ -41,6 +41,9 @@ class Oscillator(System):
         form: ``"canonical"``, where v is the velocity divided by ω₀ and the phase diagram is a circle, or ``"physical"``, where
             v is the velocity.
 
+    Raises:
+        ArgumentError: if an argument is wrong.
+
     Example:
         >>> block = sw.Oscillator(0.0, friction=0.5 * 9.81, form="physical")  # slides on a plane, μ = 0.5
         >>> run = sw.integrate(block, "false_euler", v=3.0, y=0.0, dt=1e-3, steps=1000)

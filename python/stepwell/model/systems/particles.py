@@ -31,6 +31,9 @@ class Particles(System):
 
     If ``masses`` is one number, there are as many points as the state has.
 
+    Raises:
+        ArgumentError: if an argument is wrong.
+
     Example:
         >>> ball = sw.Particles(gravity=9.81, floor=sw.Floor(restitution=0.8))
         >>> run = sw.integrate(ball, "leapfrog", v=[[1.0, 0.0]], y=[[0.0, 1.0]], dt=1 / 60, steps=600, every=1)

@@ -26,6 +26,9 @@ class Pendulum(System):
     The angle is not reduced to one turn. Its sine is accurate up to 2⁵⁰ rad and meaningless beyond;
     a run that saves such an angle gives an ``AccuracyWarning``.
 
+    Raises:
+        ArgumentError: if an argument is wrong.
+
     Example:
         >>> run = sw.integrate(sw.Pendulum(), "rk4", v=0.0, y=np.radians([10.0, 170.0]), dt=0.01, steps=740)
         >>> np.degrees(run.y[-1]).round(1)

@@ -25,6 +25,9 @@ class RestrictedThreeBody(System):
         mu: μ, the light body's fraction of the mass, above 0 and below 1; broadcasts over the batch. By default the moon's
             fraction of earth and moon, as Arenstorf used it.
 
+    Raises:
+        ArgumentError: what is wrong with ``mu``.
+
     Example:
         >>> moon = sw.scenes.arenstorf()
         >>> moon.system

@@ -52,6 +52,9 @@ class RigidBody(System):
     Attributes:
         quantities: ``"energy"``, ``"angular_momentum"``, along the axes of space, and ``"norm_error"``, q·q − 1, can be recorded.
 
+    Raises:
+        ArgumentError: if an argument is wrong.
+
     Example:
         >>> top = sw.RigidBody([1.0, 2.0, 3.0])
         >>> run = sw.integrate(top, "rk4", v=[0.01, 1.0, 0.01], y=[1.0, 0.0, 0.0, 0.0], dt=0.01, steps=1000)

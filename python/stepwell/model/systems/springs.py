@@ -53,6 +53,9 @@ class Springs(System):
     damping or drag, forces depend on the velocity, and Verlet, leapfrog and PEFRL refuse the system. ``safe_step`` returns a
     step that is safe. Lengths, masses and times may have any consistent units.
 
+    Raises:
+        ArgumentError: if an argument is wrong.
+
     Example:
         >>> pendulum = sw.Springs([(0, 1)], stiffness=100.0, rest=1.0, fixed=[0], gravity=(0.0, -9.81))
         >>> pendulum.safe_step("false_euler")

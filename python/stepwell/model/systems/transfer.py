@@ -34,6 +34,9 @@ class TransferFunction(LinearSystem):
         num: the coefficients without leading zeros.
         den: likewise.
 
+    Raises:
+        ArgumentError: if an argument is wrong.
+
     Example:
         >>> lead = sw.TransferFunction([2.0, 1.0], [0.5, 1.0], x=1.0)  # (1 + 2s)/(1 + ½s), whose output jumps to 4
         >>> run = sw.integrate(lead, "rk4", v=0.0, y=0.0, dt=0.1, steps=20, every=10)

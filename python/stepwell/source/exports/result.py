@@ -54,6 +54,9 @@ class ExportedStep(ValueEquality):
 
         Args:
             path: the file; its ending must be one of ``endings``.
+
+        Raises:
+            ArgumentError: if it has another ending or cannot be written.
         """
         place = paths.file("path", path, self.endings)
         files.write_text(place, self.source)

@@ -257,6 +257,9 @@ class WorkPrecision(Drawn, Table, ValueEquality):
 
         Returns:
             A row for each: scene, method, steps, dt, tolerance, cost per unit of simulated time, error.
+
+        Raises:
+            ArgumentError: if there is no such error or cost.
         """
         known("error", error, ERRORS)
         known("cost", cost, COSTS)

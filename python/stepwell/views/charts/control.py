@@ -190,6 +190,9 @@ def control(
     Returns:
         A ``ControlSweep``. Methods that cannot be controlled are in its ``refused``, with the reason.
 
+    Raises:
+        ArgumentError: what was given and what was expected.
+
     Example:
         >>> chart = sw.charts.control("energy_control", ["standard_euler"], relative=[0.1, 0.3], evaluations=[500], horizon=5.0)
         >>> [row["kind"] for row in chart.summary()]

@@ -223,6 +223,9 @@ def figures(methods: Iterable[Method | str] | None = None, *, phi: float = 0.5, 
         phi: Φ = ω₀·dt, the true angle per step, in radians, above zero and at most 100.
         periods: how many periods of the exact solution to cover, above zero; the last step goes to its end or past it.
 
+    Raises:
+        ArgumentError: what was given and what was expected.
+
     Warns:
         DivergenceWarning: if samples leave the finite numbers.
 

@@ -104,6 +104,9 @@ class StabilityMap(Table, ValueEquality):
 
         Args:
             steps: N, how many steps are made.
+
+        Raises:
+            ArgumentError: if there are no steps.
         """
         steps = checks.count("steps", steps, 1)
         norms = self.nonnormal[self.stable]

@@ -73,6 +73,9 @@ def panel(scenes: Iterable[Scene | str], *, progress: Callable[[float], object] 
         progress: a function that is called with the fraction that is done.
         **options: arguments of ``work_precision``: ``methods``, ``steps``, ``tolerances``, ``peers``.
 
+    Raises:
+        ArgumentError: what was given and what was expected.
+
     Example:
         >>> chart = sw.charts.panel(["oscillator"], methods=["leapfrog"], steps=[500, 1000], tolerances=[])
         >>> len(chart.charts)

@@ -100,6 +100,9 @@ def verlet_friction(dt: Any = 1 / 60) -> VerletFriction:
     Returns:
         A ``VerletFriction``: ``.plot()`` draws it.
 
+    Raises:
+        ArgumentError: what was given and what was expected.
+
     Example:
         >>> chart = sw.charts.verlet_friction()
         >>> type(chart).__name__

@@ -153,6 +153,9 @@ def stability(methods: Iterable[Method | str] | None = None, *, phi: Any = None)
         phi: angles Φ = ω₀·dt in radians, above zero, at most 100 and rising, shape (n,); if None, 200 in each unit of Φ up to
             past the largest limit.
 
+    Raises:
+        ArgumentError: what was given and what was expected.
+
     Example:
         >>> chart = sw.charts.stability(["rk4"])
         >>> round(chart.summary()[0]["limit"], 4)

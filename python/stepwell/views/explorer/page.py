@@ -136,6 +136,9 @@ class Explorer(ValueEquality):
 
         Args:
             path: the file, ending in ``.html`` or ``.htm``.
+
+        Raises:
+            ArgumentError: if it has another ending or cannot be written.
         """
         place = paths.file("path", path, (".html", ".htm"))
         files.write_text(place, self.html)
