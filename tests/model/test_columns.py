@@ -105,11 +105,15 @@ def test_derivatives_are_those_of_the_tape_of_the_step(method: str) -> None:
 
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("steps", [{"dt": 0.03, "steps": 12, "every": 5}, {"tolerance": 1e-6, "at": [0.2, 0.5]}])
-def test_both_backends_agree_and_fixed_steps_are_those_without(method: str, steps: dict[str, Any]) -> None:
+def test_both_backends_agree_and_steps_are_those_without_columns(method: str, steps: dict[str, Any]) -> None:
     if "tolerance" in steps and sw.method(method).error_order is None:
         return
     needs = sw.method(method).needs_acceleration
     system = springs(stiffening=np.array([0.5, 0.7])) if needs else duffing(beta=np.array([1.0, 1.3]))
+    if "tolerance" in steps and sw.method(method).has_series:  # which does not see a choice within a step
+        with pytest.raises(UnsupportedError, match="chooses between values"):
+            made(system, method, ("beta",), 0.2, 0.8, **steps)
+        needs, system = True, springs(stiffening=np.array([0.5, 0.7]))
     y: Any = np.array([0.3, -0.4]) if needs else 0.8
     v: Any = np.array([0.1, 0.2]) if needs else 0.2
     by = ("stiffening", "k", "y") if needs else ("beta", "omega", "v")
@@ -118,13 +122,28 @@ def test_both_backends_agree_and_fixed_steps_are_those_without(method: str, step
     begin_v, begin_y = columns.beside(v, y, (2,))
     by_numpy = sw.integrate(columns, method, v=begin_v, y=begin_y, backend="numpy", **steps)
     assert (run.v.tobytes(), run.y.tobytes()) == (by_numpy.v.tobytes(), by_numpy.y.tobytes())
-    if "tolerance" not in steps:
-        plain = sw.integrate(system, method, v=v, y=y, **steps)
+    plain = sw.integrate(system, method, v=v, y=y, **steps)
+    if "tolerance" in steps and sw.method(method).is_implicit:  # whose systems are solved with the columns in them
+        np.testing.assert_allclose(own_y, plain.y, rtol=0, atol=1e-12)
+    else:
         assert (own_v.tobytes(), own_y.tobytes()) == (plain.v.tobytes(), plain.y.tobytes())
     shapes = {name: found[name][1].shape[1:] for name in by}
     block = system.for_state_shapes(v, y).y_shape
     assert shapes[by[0]] == (*block, 2)
     assert not needs or shapes["k"] == (2, 2, 2)
+
+
+def test_a_switch_of_the_time_ends_steps_as_it_does_without_columns() -> None:
+    @sw.system(order=1)
+    def dosed(t: Any, y: Any, *, rate: Any = 1.5, dose: Any = 2.0) -> Any:
+        return np.where(t < 0.3, dose, 0.0) - rate * y
+
+    steps = {"tolerance": 1e-8, "at": [0.2, 1.0]}
+    _, (_, own_y, found), _ = made(dosed(), "dop853", ("dose", "rate"), None, 0.0, **steps)
+    assert own_y.tobytes() == sw.integrate(dosed(), "dop853", y=0.0, **steps).y.tobytes()
+    # y = (dose/rate)(1 − e^(−rate·0.3))·e^(−rate·(t − 0.3)), and linear in the dose.
+    true = (1.0 - np.exp(-1.5 * 0.3)) / 1.5 * np.exp(-1.5 * 0.7)
+    assert abs(found["dose"][1][-1] - true) < 1e-8
 
 
 def test_what_is_not_made_of_rates_is_refused() -> None:

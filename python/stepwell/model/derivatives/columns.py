@@ -12,6 +12,7 @@ from ... import _core
 from ...base import checks
 from ...base.arrays import Array, Shape
 from ...errors import UnsupportedError
+from ...reference.acceptance import NO_GROUP, Acceptance
 from ...reference.tape.evaluate import Evaluation
 from ...reference.tape.modes import directional
 from ...reference.traced import Tracer
@@ -57,6 +58,8 @@ class Columns(System):
     A column is a vector like (v, y). In a block the state comes first, then the first number of all columns, then the second, and
     so on. The rate of a column is J·column + ∂f/∂p, with the Jacobian J of the rates f, for the parameter p of the column. A
     method that makes its steps of sums of rates makes of this the exact derivative of its step of the system, rounding aside.
+    With a tolerance accepted steps are held: columns are the derivative of these steps, which may be too long for the columns
+    where the motion comes to rest.
 
     Args:
         system: the system, with the shapes of its state.
@@ -97,6 +100,13 @@ class Columns(System):
         is_plain = isinstance(system, OwnSystem) and system.equations is not None and system.equations.second_order
         dy = None if is_plain else self._rates[rows_of_v:]
         self._core = traced.tape.equations(self._rates[:rows_of_v], dy, [], None, functions)
+
+    @property
+    def groups(self) -> tuple[int, ...]:
+        """The groups of the system, and none for the columns: steps with a tolerance are those of the system alone."""
+        n_v, n_y = self.numbers
+        groups = Acceptance(self.of.groups).of_numbers(n_v, n_y)
+        return groups[:n_v] + (NO_GROUP,) * (n_v * self.columns) + groups[n_v:] + (NO_GROUP,) * (n_y * self.columns)
 
     def reference(self, h: Any, **parameters: Any) -> Any:  # type: ignore[override]  # made as by a class
         """The rates of symbols and series."""
@@ -184,6 +194,25 @@ class Columns(System):
             tracer.symbols(value, batch)  # which collects their numbers
         evaluation = Evaluation(self._tape, self._rates, dict(enumerate(tracer.numbers)), tracer.tables)
         return _Rates(h, lambda rows, t: evaluation(rows, t), self.v_shape[0])
+
+    @property
+    def chooses(self) -> bool:
+        """True if the rates of the system are made of pieces."""
+        return self.of.chooses
+
+    @property
+    def reads_time(self) -> bool:
+        """True if the rates of the system depend on the time."""
+        return self.of.reads_time
+
+    @property
+    def switches_by_time(self) -> bool:
+        """True if the time alone chooses between pieces of the rates."""
+        return self.of.switches_by_time
+
+    def switching_times(self, begin: float, end: float) -> Array:
+        """The times at which it does."""
+        return self.of.switching_times(begin, end)
 
     def given_inputs(self) -> dict[str, Input]:
         """The inputs of the system."""

@@ -1,9 +1,9 @@
-//! What is tolerated of a step: the sizes of groups of components, and their tolerances.
+//! The conditions for a step to be accepted: sizes of groups of components, and their tolerances.
 
 use super::{controller::Pace, sizes::absolute};
 use crate::tape::number::Number;
 
-/// What a step must satisfy to be accepted.
+/// The conditions for a step to be accepted.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Hash)]
 pub struct Acceptance {
     /// For each number of v, then of y, the group to which it belongs, counted from 0 without gaps, those of v first. The error
@@ -19,7 +19,7 @@ pub struct Acceptance {
 }
 
 impl Acceptance {
-    /// How many groups v and y have, of so many numbers.
+    /// The numbers of groups of v and y, which have `v` and `y` numbers.
     pub(crate) fn counts(&self, v: usize, y: usize) -> [usize; 2] {
         if self.groups.is_empty() {
             return [v, y].map(|numbers| usize::from(numbers > 0));
@@ -64,18 +64,18 @@ fn length<'a, N: Number>(mut numbers: impl ExactSizeIterator<Item = &'a N>) -> N
 pub(crate) struct Scales<N> {
     /// The largest size so far of each group.
     pub longest: Vec<N>,
-    /// What the rounding of the rates of each group makes in a unit of time, as far as it is known: see [`Pace::heard`].
+    /// The error per unit of time by the rounding of each group's rates, as far as it is known: see [`Pace::heard`].
     pub noise: Vec<N>,
     /// Of each group the error of steps that failed by it over the power 3/2 of their length, the largest; or zero.
     pub failed: Vec<N>,
     /// Tolerances of their own: the relative one of each group, then the absolute one of each; empty if there are none.
     pub own: Vec<N>,
-    /// What each number of v, then of y, is more than the state has, where the method keeps it; else empty.
+    /// The part of each number of v, then of y, that rounding left out of the state, where the method keeps it; else empty.
     pub low: Vec<N>,
 }
 
 impl<N: Number> Scales<N> {
-    /// From its numbers, for a state of so many numbers.
+    /// Reads the scales from their numbers, for a state of `state` numbers.
     pub(crate) fn of(numbers: &[N], acceptance: &Acceptance, state: usize) -> Self {
         let (numbers, low) = numbers.split_at(numbers.len() - if acceptance.compensated { state } else { 0 });
         let groups = numbers.len() / if acceptance.own { 5 } else { 3 };

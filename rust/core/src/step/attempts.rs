@@ -42,7 +42,7 @@ impl TriedRows {
     }
 }
 
-/// What attempts at adaptive steps are traced of.
+/// The model and the acceptance for which attempts at adaptive steps are traced.
 pub(super) struct AttemptsOf<'a> {
     pub kind: &'a Kind,
     pub signature: &'a Signature,
@@ -119,7 +119,7 @@ impl AttemptsOf<'_> {
         self.forced(step, pushed)
     }
 
-    /// What acts on the state after a step.
+    /// The system whose control or projection acts on the state after a step.
     fn after(&self) -> Box<dyn System<Symbol>> {
         if controls::pushes(self.signature) { self.scaled(Symbol::of(1.0)) } else { self.projected() }
     }

@@ -3,12 +3,12 @@
 use super::sizes::longer;
 use crate::tape::number::Number;
 
-/// A new step is at least and at most so many times the old one.
+/// Bounds of the new step over the old one.
 pub(crate) const MIN_FACTOR: f64 = 0.2;
 pub(crate) const MAX_FACTOR: f64 = 5.0;
 /// See `runs/engine/adaptive.py`.
 const BLIND: f64 = 1.0 / (1u64 << 20) as f64;
-/// The first step, and one after a jump, is at least so many times the time: 2¹² roundings.
+/// The first step, and one after a jump, is at least this part of the time: 2¹² roundings.
 pub(crate) const MOVES: f64 = 1.0 / (1u64 << 40) as f64;
 
 /// The structure and its numbers, in one order that is written once.
@@ -109,7 +109,7 @@ pub(crate) struct Outlook<N: Number> {
 }
 
 impl Pace<usize> {
-    /// The places of its numbers, which stand behind so many others.
+    /// The places of its numbers, which come after `others` other numbers.
     pub(crate) fn places(others: usize) -> Self {
         Pace::of(std::array::from_fn(|i| others + i))
     }
@@ -121,8 +121,7 @@ impl Pace<f64> {
         self.outlook(budget).runs
     }
 
-    /// The same of many members, from rows of their numbers: without moving what is not needed, for this is asked after every
-    /// attempt.
+    /// As `runs`, for many members, from rows of their numbers: moves nothing unneeded, for it is called after every attempt.
     pub(crate) fn find_running<'a>(row: impl Fn(usize) -> &'a [f64], budget: f64, runs: &mut [bool]) {
         let places = Pace::of(std::array::from_fn(|i| i as f64));
         let row = |place: f64| row(place as usize);
@@ -168,7 +167,7 @@ impl Pace<f64> {
         Pace { h: -BLIND, target: t, extra: none, held: none, begin: t, wall, before: 1.0, most: MAX_FACTOR, ..self }
     }
 
-    /// The same where nothing runs.
+    /// The pace of a lane where nothing runs.
     #[must_use]
     pub(crate) fn idle(self) -> Self {
         Pace { target: self.t, extra: 0.0, held: 0.0, ..self }
@@ -189,7 +188,7 @@ impl<N: Number> Pace<N> {
         (N::choose(ends, self.wall, self.t + self.h), ends)
     }
 
-    /// What comes next.
+    /// The next step.
     pub(crate) fn outlook(&self, budget: N) -> Outlook<N> {
         let zero = N::of(0.0);
         let is_extra = zero.below(self.extra);

@@ -57,7 +57,7 @@ const ROUNDINGS: f64 = 2.0;
 /// margin. So an error of v that moves y by less is tolerated, however small v is: near rest, where forces cancel, v is only
 /// rounding.
 pub(crate) const ROUNDING: f64 = 1.0 / (1u64 << 40) as f64;
-/// The same of states of float32, whose roundings are 2²⁹ times as large.
+/// The rounding for states of float32, whose roundings are 2²⁹ times as large.
 pub(crate) const SINGLE_ROUNDING: f64 = 1.0 / (1u64 << 11) as f64;
 /// A component that has been zero so far counts as this part of the largest in its block. A cascade or a wave reaches one
 /// component after the other, each at first with a power of the time that is beyond the order of the method: relative to itself
@@ -144,7 +144,7 @@ impl<N: Number> Pace<N> {
     }
 }
 
-/// For each group of v the size of its y; where they are not so many, the largest.
+/// For each group of v the size of its y; the largest, if y has another number of groups.
 fn paired<N: Number>(of_y: &[N], number: usize) -> Vec<N> {
     if of_y.len() == number { of_y.to_vec() } else { vec![largest(of_y); number] }
 }
@@ -184,7 +184,7 @@ pub(crate) struct Attempted<'a, N: Number> {
     pub projected: &'a dyn System<N>,
 }
 
-/// What an attempt made: squares are nowhere, only sizes of groups.
+/// The result of an attempt: sizes of groups only, no squares.
 #[derive(Debug)]
 pub(crate) struct Made<N> {
     /// Before the step.
@@ -271,7 +271,7 @@ pub(crate) fn changes_within<N: Number>(pace: &Pace<N>, scales: &Scales<N>, old:
     N::of(0.0).below(pace.lasts) & !largest(&shares).at_most(N::of(1.0))
 }
 
-/// What comes after an attempt, and whether the state goes on. `counts` are how many groups v and y have.
+/// The pace after an attempt, and whether the state goes on. `counts` are the numbers of groups of v and y.
 pub(crate) fn judge<N: Number>(
     pace: &Pace<N>,
     scales: &Scales<N>,
@@ -371,7 +371,7 @@ impl<N: Number> Pace<N> {
         scales.noise.iter().enumerate().map(of_group).collect()
     }
 
-    /// What is known of rounding after an attempt: [`Scales::noise`] and [`Scales::failed`].
+    /// The estimates of rounding after an attempt: [`Scales::noise`] and [`Scales::failed`].
     fn heard(
         &self,
         next: &Pace<N>,
@@ -409,7 +409,7 @@ impl<N: Number> Pace<N> {
         (0..error.len()).map(of_group).unzip()
     }
 
-    /// What comes after an attempt with this error, the largest sizes so far, and whether the state goes on. `high`: the estimate
+    /// The pace after an attempt with this error, the largest sizes so far, and whether the state goes on. `high`: the estimate
     /// is of a high order; `rests`: nothing moved; `longest` and `new` are the largest sizes before, and those that the groups
     /// would have.
     fn decided(

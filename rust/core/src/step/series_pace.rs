@@ -26,7 +26,7 @@ const MARGIN: f64 = 0.7 * std::f64::consts::LOG2_E;
 /// small.
 const SHARE: f64 = 0.5;
 /// A step that failed is tried again with this part of its length. Three more of these come before steps grow again, at first
-/// twofold: so many are left before what it met.
+/// twofold: that many are left before what it met.
 const SHRINK: f64 = 0.25;
 /// The last two terms may vanish by chance, as at the turning point of a pendulum at a right angle, of whose series only every
 /// fourth term is left. So a step is rejected whose end shows that it erred by this many times what is tolerated.
@@ -153,7 +153,7 @@ pub(crate) fn share_of(length: f64, before: f64) -> f64 {
     length * (1.0 / f64::from_bits(before.to_bits() & EXPONENT))
 }
 
-/// So many states within a step are summed side by side.
+/// States within a step that are summed side by side.
 pub(crate) const SIDE: usize = 8;
 
 /// One number of the states that an attempt makes at parts of its step, of that many coefficients, at least two, each so far
@@ -187,14 +187,14 @@ pub(crate) fn sums(
     sum
 }
 
-/// What [`reach`] finds.
+/// The result of [`reach`].
 struct Reach<N> {
     /// How far the series is as good as is tolerated.
     far: N,
     /// The motion in one unit of time over the tolerated error of the largest sizes so far.
     moved: N,
-    /// What a step may err: of each group the defect times the step, that is by how much the series and the rates at its end
-    /// differ. It is p + 1 times the first term that is left out.
+    /// The error that a step may have: for each group the defect times the step, the difference between the series and the
+    /// rates at its end. It is p + 1 times the first term that is left out.
     allowed: Vec<N>,
 }
 
@@ -309,7 +309,7 @@ fn furthest<N: Number>(terms: &[Option<N>], share: N, part: impl Fn(N) -> N) -> 
     total.map_or(start, |total| start + share * total)
 }
 
-/// What comes after a step, which may end at the wall, the largest sizes so far, and whether the state goes on. `longest` and
+/// The pace after a step, which may end at the wall, the largest sizes so far, and whether the state goes on. `longest` and
 /// `new` are the largest sizes before, and those that the groups would have. The series holds over the step if its end agrees
 /// with the rates and if functions stay on their branch, none if that is not asked; but for a `tolerable` step, which may leave
 /// it since all its motion is tolerated: no shorter one is tried for their sake.
