@@ -15,7 +15,7 @@ FIXED, ADAPTIVE = {"dt": 0.1, "steps": 2}, {"tolerance": 1e-6, "at": [1.0]}
 SOMETHING: dict[str, Any] = {
     "steps": 3, "every": 1, "tolerance": 1e-6, "at": [1.0], "record": "energy", "form": "matrix", "start": "first_order",
     "max_steps": 9, "max_step": 0.1, "jumps": [0.5], "positive": True, "progress": True, "threads": 2, "backend": "numpy",
-    "start_step": 1, "resume": sw.integrate(sw.Oscillator(), "rk4", **START, **FIXED),
+    "start_step": 1, "sensitivity": "y", "resume": sw.integrate(sw.Oscillator(), "rk4", **START, **FIXED),
 }  # fmt: skip
 REFUSED = [(name, way) for name, option in OPTIONS.items() for way, no in option.ways.items() if isinstance(no, No)]
 

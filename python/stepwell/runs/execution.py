@@ -17,6 +17,11 @@ from .result import Run
 
 def step(request: Request, waypoints: list[Array] | None = None) -> Run:
     """The requested run, without findings and warnings; ``waypoints`` gets where members with adaptive steps stood on the way."""
+    if request.options is not None and (names := request.options["sensitivity"]) is not None:
+        from . import sensitivities  # only such runs need it
+
+        sensitivities.check(request)
+        return sensitivities.run_of(request, names, step)
     if request.step_control is None:
         return fixed_run(request)
     from .adaptive import adaptive_run  # only such runs need it

@@ -113,6 +113,9 @@ class Run(ValueEquality):
         steps: number of steps.
         start: how the method was started, or None.
         recorded: the quantities named in ``record=``, by name, shapes (saved, *shape of it, *batch).
+        sensitivity: the derivatives of y by what ``sensitivity=`` names, shapes (saved, *block, *own, *batch), with the axes of a
+            parameter itself, or of the block for "v" and "y".
+        sensitivity_of_v: the derivatives of v, likewise.
         events: where the quantities given as ``events=`` changed their signs, ``Occurrences`` by the name of the event.
         stopped_at: the time at which each member stopped, by a terminal event or, with a tolerance, by itself before the last
             output time; NaN for others, shape (*batch). Later saved states are that of the event, or NaN. None if none stopped by
@@ -198,6 +201,9 @@ class Run(ValueEquality):
         self.force = force
         #: The options that hold for a run that goes on, too, beside those that are attributes.
         self.options = FixedDict(options or {})
+        #: The derivatives of the saved y, and of the saved v, by the names of ``sensitivity=``.
+        self.sensitivity: dict[str, Array] = {}
+        self.sensitivity_of_v: dict[str, Array] = {}
         self.events: dict[str, Occurrences] = {}
         self.stopped_at: Array | None = None
 
@@ -236,7 +242,8 @@ class Run(ValueEquality):
             ) from None
         part = copy.copy(self)
         part.t, part.v, part.y = self.t[places], self.v[places], self.y[places]
-        part.recorded = {name: values[places] for name, values in self.recorded.items()}
+        for of_states in ("recorded", "sensitivity", "sensitivity_of_v"):
+            setattr(part, of_states, {name: values[places] for name, values in getattr(self, of_states).items()})
         part.has_each_step = False
         part.is_part = self.is_part or not len(places) or bool(places[-1] != len(self.t) - 1)
         return part

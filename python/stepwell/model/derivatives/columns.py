@@ -77,7 +77,7 @@ class Columns(System):
         self.of, self.by, self.batch = system, tuple(by), system.batch
         self.second_order, self.velocity_term = system.second_order, system.velocity_term
         self.numbers = prod(system.v_shape), prod(system.y_shape)
-        parameters = _parameters(system)
+        parameters = parameters_of(system)
         blocks = {"v": system.v_shape, "y": system.y_shape}
         self.own = {name: blocks[name] if name in blocks else parameters[name].shape for name in self.by}
         #: The numbers of parameters that the columns are derivatives by; None for columns by the start.
@@ -219,13 +219,13 @@ class Columns(System):
         return self.of.given_inputs()
 
 
-def _parameters(system: System) -> dict[str, Any]:
-    """The parameters of a system that are numbers: arrays of the places of their symbols, of the shape of each."""
+def parameters_of(system: System) -> dict[str, Any]:
+    """The parameters whose numbers reach the rates as they are: arrays of the places of their symbols, of the shape of each."""
     places: dict[str, Any] = {}
     tracer = Tracer(system, _core.Tape())
     for name, value in system.own_parameters(system.batch).items():
         first = len(tracer.numbers)
         symbols = tracer.symbols(value, system.batch)
-        if isinstance(symbols, np.ndarray):
+        if isinstance(symbols, np.ndarray) and system.direct().get(name, ("",))[0] == name:
             places[name] = first + np.arange(symbols.size).reshape(symbols.shape)
     return places

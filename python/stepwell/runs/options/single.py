@@ -76,6 +76,19 @@ def _is_smooth(given: Any) -> bool:
     return isinstance(given, Sinusoid) or (isinstance(given, Sampled) and given.interpolation != "hold" and not given.constant)
 
 
+def names_of_sensitivities(system: System, sensitivity: Any) -> tuple[str, ...]:
+    """The names of what states are differentiated by: "v" and "y" at the start, and parameters."""
+    from ...model.derivatives.columns import parameters_of  # only such runs need it
+
+    names = [sensitivity] if isinstance(sensitivity, str) else checks.several("sensitivity", sensitivity, "names")
+    known = (*(("v",) if system.v_shape != (0,) else ()), "y", *parameters_of(system))
+    for name in names:
+        checks.known("sensitivity", name, known)
+    if twice := [name for i, name in enumerate(names) if name in names[:i]]:
+        raise ArgumentError(f"sensitivity: expected each name once, got {twice[0]!r} twice")
+    return tuple(names)
+
+
 def quantities(system: System, record: Any) -> list[str]:
     """The quantities to record, each once; raise if the system does not have one."""
     if type(record) is tuple and not record:

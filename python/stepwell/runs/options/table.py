@@ -312,6 +312,20 @@ class RunOptions(TypedDict, total=False):
             ways={"fixed": _ADAPTIVE_ONLY, "World": _NO_ADAPTIVE_WORLD},
         ),
     ]
+    sensitivity: Annotated[
+        str | Sequence[str] | None,
+        Option(
+            """what to differentiate the states by: names of parameters, and "v" and "y" for those at the start, one or a list;
+            ``run.sensitivity["beta"]`` is then ∂y/∂β, shape (saved, *block, *own, *batch) with the axes of the parameter itself,
+            and ``run.sensitivity_of_v["beta"]`` is ∂v/∂β. They are exact derivatives of the computed steps; accepted steps are
+            held, which are those without. Each number costs about as much as the run (docs/howto/derivatives.md).""",
+            check=lambda sensitivity, asked: single.names_of_sensitivities(asked.system, sensitivity),
+            ways={
+                "World": _OF_A_RUN,
+                "sweep": No("the outcomes of a sweep are those of states; integrate differentiates them"),
+            },
+        ),
+    ]
     progress: Annotated[
         bool,
         Option(
