@@ -194,20 +194,14 @@ class _Run:
             ]
         most = (HUGE_SINGLE if self.stages.single else HUGE) * min(abs(plan.dt), 1.0)
         counts = (np.int64(first), np.int64(launch.intervals), np.int64(launch.length), np.int32(launch.saves))
-        since = np.int32(done > 0)
+        since, seen = np.int32(done > 0), (np.int32(not np.isnan(self.last_t)), np.float64(self.last_t), self.reduced)
         self.call(
             "steps", self.members, *self.numbers.arguments, *counts, *of_time, since, self.kind(most), self.table,
-            self.now, self.next, *self.saved, self.bad, *self.of_observer(),
+            self.now, self.next, *self.saved, self.bad, *(() if self.observer is None else seen),
         )  # fmt: skip
         if launch.saves:
             self.last_t = plan.t0 + (first + count) * plan.dt
         self.now, self.next = self.next, self.now
-
-    def of_observer(self) -> tuple[Any, ...]:
-        """The last arguments of the steps if they observe."""
-        if self.observer is None:
-            return ()
-        return np.int32(not np.isnan(self.last_t)), np.float64(self.last_t), self.reduced
 
     def read(self, at: int, count: int) -> int:
         """Take saved states from the device, from the ``at``-th on; returns the number of the next.
