@@ -33,12 +33,7 @@ ERRORS = {
     "energy_error": "largest energy error of the run, relative",
 }
 #: The word before "digits" in a title, by kind of error; empty means the state.
-DIGITS_OF = {
-    "state_error": "",
-    "end_error": " at the end",
-    "phase_error": " of the phase",
-    "energy_error": " of the energy",
-}
+DIGITS_OF = {"state_error": "", "end_error": " at the end", "phase_error": " of the phase", "energy_error": " of the energy"}
 COUNTED = "function evaluations per unit of simulated time"
 TIMES = {"batch": "batch", "single": "single run"}
 
