@@ -167,19 +167,14 @@ def _over_gains(axes: Axes, chart: ControlSweep, what: str, name: str) -> None:
         values = np.maximum(getattr(line, what), LEAST_DRAWN)
         shown = np.where(np.isfinite(values), values, np.nan)
         look = look_of(chart, line.method) | FORMS[line.kind]
-        axes.plot(line.relative, shown, **look, markevery=_every(line, methods))
+        step = max(1, len(line.relative) // 8)  # between markers, those of each method at other points
+        axes.plot(line.relative, shown, **look, markevery=(methods.index(line.method) % step, step))
         mark_lost(axes, line, ~np.isfinite(values), (methods.index(line.method) + 0.5) / len(methods), look)
         if line.kind == "limited" or not any(each.kind == "limited" for each in chart.lines):
             known = np.flatnonzero(np.isfinite(shown))
             ends += [(float(gains[-1]), float(shown[i]), line.method.title, str(look["color"])) for i in known[-1:]]
     axes.minorticks_off()
     at_ends(axes, ends, 12.0, ROOM)
-
-
-def _every(line: Held, methods: list[Method]) -> tuple[int, int]:
-    """Markers on every third point, those of each method at others."""
-    step = max(1, len(line.relative) // 8)
-    return methods.index(line.method) % step, step
 
 
 def strip(axes: Axes) -> None:
