@@ -16,9 +16,11 @@ import numpy as np
 from .. import _core
 from ..base.arrays import Array
 from ..errors import UnsupportedError
+from ..reference.adaptive.controller import MAX_FACTOR, MIN_FACTOR, MOVES, Pace
 from ..reference.signal import HOLD_SLACK
 from . import promise
-from .fixed import LAUNCH, MOST_AT_FIRST, MOST_SAVED, MOST_TEXTS
+from .bodies import LAUNCH
+from .fixed import MOST_AT_FIRST, MOST_SAVED, MOST_TEXTS
 from .opencl import Machine
 from .reductions import ARGUMENTS as OF_AN_OBSERVER
 from .reductions import Observer
@@ -26,18 +28,13 @@ from .stages import ARGUMENTS, Numbers, Stages
 
 #: Attempts of the first launch, which shows how long one takes, and the most of any.
 FIRST_LAUNCH, MOST_ATTEMPTS = 16, 1 << 16
-#: The numbers of a pace, as the core has them.
-PACE = (
-    "t", "h", "target", "extra", "held", "relative", "absolute", "lasts", "begin", "interval", "until", "most_step", "wall",
-    "before", "most", "accepted", "rejected", "extra_steps", "error", "work",
-)  # fmt: skip
+#: The numbers of a pace before those of groups.
+PACE = Pace._fields[: Pace._fields.index("longest")]
 #: Further state of a member between launches: whole numbers, and numbers.
 MARKS = ("next", "kept", "passed", "held_before", "has_origin", "is_known", "status")
 SEEN = ("seen_accepted", "origin_rejected")
 #: The status of a member that is not at its end.
 RUNNING = -2
-#: After a jump a step is so many times the one before, and at least so many times the time; and it may grow by so much.
-MIN_FACTOR, MOVES, MAX_FACTOR = 0.2, 2.0**-40, 5.0
 #: The first waypoint, and how many are kept.
 FIRST_WAYPOINT, WAYPOINTS = 256, 2
 

@@ -12,21 +12,20 @@ import numpy as np
 from .. import _core
 from ..base.arrays import Array
 from . import bodies, promise
+from .bodies import HUGE, LAUNCH
 from .opencl import Machine
 from .reductions import ARGUMENTS as OF_AN_OBSERVER
 from .reductions import Observer
 from .stages import ARGUMENTS, Numbers, Stages, wide
 
-#: A launch takes about so long, in seconds: a desktop's watchdog ends longer ones, and Ctrl-C waits for one.
-LAUNCH = 0.05
 #: Steps of the first launch, which shows how long one takes, and the most of any.
 FIRST_LAUNCH, MOST_STEPS = 32, 1 << 16
 #: Steps of members in the first launch, at most.
 MOST_AT_FIRST = 1 << 21
 #: The most bytes of saved states and of tables of steps on the device at a time.
 MOST_SAVED, MOST_TABLE = 1 << 28, 1 << 26
-#: Velocities that are computed from a carry may be infinite once its numbers are of this size, as in the core.
-HUGE, HUGE_SINGLE = 2.0**960, 2.0**64
+#: ``HUGE`` in float32.
+HUGE_SINGLE = 2.0**64
 #: How many texts a process keeps.
 MOST_TEXTS = 256
 
@@ -194,20 +193,14 @@ class _Run:
             ]
         most = (HUGE_SINGLE if self.stages.single else HUGE) * min(abs(plan.dt), 1.0)
         counts = (np.int64(first), np.int64(launch.intervals), np.int64(launch.length), np.int32(launch.saves))
-        since = np.int32(done > 0)
+        since, seen = np.int32(done > 0), (np.int32(not np.isnan(self.last_t)), np.float64(self.last_t), self.reduced)
         self.call(
             "steps", self.members, *self.numbers.arguments, *counts, *of_time, since, self.kind(most), self.table,
-            self.now, self.next, *self.saved, self.bad, *self.of_observer(),
+            self.now, self.next, *self.saved, self.bad, *(() if self.observer is None else seen),
         )  # fmt: skip
         if launch.saves:
             self.last_t = plan.t0 + (first + count) * plan.dt
         self.now, self.next = self.next, self.now
-
-    def of_observer(self) -> tuple[Any, ...]:
-        """The last arguments of the steps if they observe."""
-        if self.observer is None:
-            return ()
-        return np.int32(not np.isnan(self.last_t)), np.float64(self.last_t), self.reduced
 
     def read(self, at: int, count: int) -> int:
         """Take saved states from the device, from the ``at``-th on; returns the number of the next.

@@ -698,14 +698,11 @@ def target(system: System, name: str) -> Target:
         value = parameters[name]
         if not isinstance(value, np.ndarray):
             raise ArgumentError(f"sets: expected a parameter that is a number, got {name}, which changes with the time")
-        return Target(name, direct[name], None, direct[name], value.shape[: _own_axes(system, name)])
+        definition = getattr(system, "definition", None)
+        own = 0 if definition is None else definition.own_axes[name]
+        return Target(name, direct[name], None, direct[name], value.shape[:own])
     known = ", ".join(dict.fromkeys([*direct, *inputs, *system.input_names])) or "none"
     raise UnknownNameError(f"sets: expected a parameter of the system that may have any value, got {name!r}. Known: {known}.")
-
-
-def _own_axes(system: System, name: str) -> int:
-    definition = getattr(system, "definition", None)
-    return 0 if definition is None else int(definition.own_axes[name])
 
 
 def _symbols(shape: Shape, symbols: Any) -> Any:

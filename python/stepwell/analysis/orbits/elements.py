@@ -20,14 +20,7 @@ NONE = 16.0 * 2.0**-52
 
 #: Ways to say how large an orbit is, and where on it the body is: at most one of each.
 SIZES = ("a", "period", "periapsis")
-PLACES = (
-    "true_anomaly",
-    "mean_anomaly",
-    "eccentric_anomaly",
-    "true_longitude",
-    "mean_longitude",
-    "time_of_periapsis",
-)
+PLACES = ("true_anomaly", "mean_anomaly", "eccentric_anomaly", "true_longitude", "mean_longitude", "time_of_periapsis")
 ARGUMENTS = ("argument_of_periapsis", "longitude_of_periapsis")
 
 #: All names of elements.

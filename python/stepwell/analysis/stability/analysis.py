@@ -195,9 +195,6 @@ class Analysis(ValueEquality):
         Returns:
             The figure; a notebook shows it.
 
-        Raises:
-            UnsupportedError: if matplotlib is missing.
-
         Example:
             >>> import stepwell as sw
             >>> figure = sw.analyse(sw.Oscillator(), "rk4", dt=0.5).plot()

@@ -28,12 +28,6 @@ NONE = np.empty(0, np.intp)
 MOST_FRAMES = 1024
 
 
-def _mode(value: Any) -> AutoresetMode:
-    if isinstance(value, AutoresetMode):
-        return value
-    return AutoresetMode(checks.known("autoreset_mode", value, [each.value for each in AutoresetMode]))
-
-
 def _ends(space: Any) -> tuple[Any, Any, bool]:
     """The least and the largest action, and whether actions are whole numbers."""
     if isinstance(space, Box):
@@ -179,7 +173,9 @@ class WorldVectorEnv(VectorEnv):  # type: ignore[misc]  # gymnasium's types are 
                 f"dtype: {kind.__name__} makes a world of {self.world.y.dtype}, and {self.dtype} was asked for; let its "
                 f"make_world make arrays of self.dtype, and World(…, dtype=self.dtype)"
             )
-        self.autoreset_mode = _mode(autoreset_mode)
+        if not isinstance(autoreset_mode, AutoresetMode):
+            checks.known("autoreset_mode", autoreset_mode, [each.value for each in AutoresetMode])
+        self.autoreset_mode = AutoresetMode(autoreset_mode)
         self._camera: Camera | None = None
         self._window: Window | None = None
         fps = max(1, round(1.0 / (self.world.dt * self.substeps)))

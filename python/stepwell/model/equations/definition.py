@@ -264,13 +264,7 @@ def _from_signature(function: Callable[..., Any], state: int) -> dict[str, Any]:
 def system(function: Callable[..., Any], /) -> Definition: ...
 @overload
 def system(
-    *,
-    order: int = 2,
-    blocks: int = 1,
-    shape: Any = None,
-    quick_sines: bool = False,
-    scale: Scale = "component",
-    mass: Any = None,
+    *, order: int = 2, blocks: int = 1, shape: Any = None, quick_sines: bool = False, scale: Scale = "component", mass: Any = None
 ) -> Callable[[Callable[..., Any]], Definition]: ...
 def system(
     function: Any = None,

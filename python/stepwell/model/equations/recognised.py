@@ -163,7 +163,8 @@ def _of_function(function: FunctionType, reading: Reading) -> Any:
             read.append((name, _of(names[name], reading)))
             continue
         reading.names.append((known, name, known.get(name, _MISSING)))
-        if not _is_pure(known.get(name)):
+        value = known.get(name)  # of Python; classes of errors read nothing but their arguments
+        if not (value in PURE or (isinstance(value, type) and issubclass(value, BaseException))):
             raise Unknown
     cells = function.__closure__ or ()
     try:
@@ -177,8 +178,3 @@ def _of_function(function: FunctionType, reading: Reading) -> Any:
         by_name = [(name, _of(value, reading)) for name, value in keywords.items()]
     own = _of(vars(function), reading) if vars(function) else None
     return function.__code__, tuple(read), captured, _of(function.__defaults__, reading), tuple(by_name), own
-
-
-def _is_pure(value: Any) -> bool:
-    """True if a built-in of Python reads nothing but its arguments, as classes of errors do."""
-    return value in PURE or (isinstance(value, type) and issubclass(value, BaseException))

@@ -46,13 +46,7 @@ class Particles(System):
     axes = "points, dim"
 
     def __init__(
-        self,
-        masses: Any = 1.0,
-        *,
-        gravity: Any = 9.81,
-        drag: Any = None,
-        floor: Any = None,
-        dim: int | None = None,
+        self, masses: Any = 1.0, *, gravity: Any = 9.81, drag: Any = None, floor: Any = None, dim: int | None = None
     ) -> None:
         self.masses = checks.numbers("masses", masses, positive=True)
         if self.masses.ndim and len(self.masses) == 0:

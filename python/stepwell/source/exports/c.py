@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any, ClassVar
 
+from .language import functions_on_bits
 from .lines import listed
 from .names import Field
 from .program import FORCE
@@ -98,13 +99,7 @@ HELPERS = {
     "turn_sign": TURN_SIGN,
     "mask_of": _on_bits("mask_of", "int truth", "truth ? ~UINT64_C(0) : 0"),
     "choose_bits": _on_bits("choose_bits", "uint64_t mask, uint64_t a, uint64_t b", "(mask & a) | (~mask & b)"),
-    "and_bits": _on_bits("and_bits", TWO, "a & b"),
-    "or_bits": _on_bits("or_bits", TWO, "a | b"),
-    "xor_bits": _on_bits("xor_bits", TWO, "a ^ b"),
-    "add_bits": _on_bits("add_bits", TWO, "a + b"),
-    "sub_bits": _on_bits("sub_bits", TWO, "a - b"),
-    "shift_up": _on_bits("shift_up", SHIFT, "a << n"),
-    "shift_down": _on_bits("shift_down", SHIFT, "a >> n"),
+    **functions_on_bits(_on_bits, TWO, SHIFT),
 }
 
 

@@ -9,6 +9,7 @@ from typing import Any, ClassVar
 from ...base.arrays import Shape
 from ..explanation import formula as plain
 from ..explanation.formula import Formula
+from .language import functions_on_bits
 from .lines import indented, listed
 from .names import camel
 from .program import FORCE
@@ -45,13 +46,7 @@ ON_BITS = {
     "turn_sign": TURN_SIGN,
     "mask_of": _on_bits("mask_of", "bool truth", "truth ? ulong.MaxValue : 0"),
     "choose_bits": _on_bits("choose_bits", "ulong mask, ulong a, ulong b", "(mask & a) | (~mask & b)"),
-    "and_bits": _on_bits("and_bits", TWO, "a & b"),
-    "or_bits": _on_bits("or_bits", TWO, "a | b"),
-    "xor_bits": _on_bits("xor_bits", TWO, "a ^ b"),
-    "add_bits": _on_bits("add_bits", TWO, "unchecked(a + b)"),
-    "sub_bits": _on_bits("sub_bits", TWO, "unchecked(a - b)"),
-    "shift_up": _on_bits("shift_up", SHIFT, "a << n"),
-    "shift_down": _on_bits("shift_down", SHIFT, "a >> n"),
+    **functions_on_bits(_on_bits, TWO, SHIFT, add_bits="unchecked(a + b)", sub_bits="unchecked(a - b)"),
 }
 
 HELPERS = {

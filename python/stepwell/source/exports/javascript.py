@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import Any, ClassVar
 
 from ..explanation.formula import Formula
+from .language import functions_on_bits
 from .lines import indented
 from .names import camel
 from .skeleton import Skeleton
@@ -64,6 +65,10 @@ def _on_bits(name: str, arguments: str, expression: str) -> str:
     return f"function {name}({arguments}) {{\n  return {expression};\n}}"
 
 
+#: Operations on whole numbers of 64 bits.
+WAYS = {name: f"BigInt.asUintN(64, {way})" for name, way in (("add_bits", "a + b"), ("sub_bits", "a - b"))}
+WAYS |= {"shift_up": "BigInt.asUintN(64, a << BigInt(n))", "shift_down": "a >> BigInt(n)"}
+
 #: Operations whose result is rounded.
 ROUNDED = ("add", "subtract", "multiply", "divide", "square root")
 
@@ -87,13 +92,7 @@ class JavaScript(Skeleton):
         "turn_sign": TURN_SIGN,
         "mask_of": _on_bits("mask_of", "truth", "truth ? 0xffffffffffffffffn : 0n"),
         "choose_bits": _on_bits("choose_bits", "mask, a, b", "(mask & a) | (BigInt.asUintN(64, ~mask) & b)"),
-        "and_bits": _on_bits("and_bits", "a, b", "a & b"),
-        "or_bits": _on_bits("or_bits", "a, b", "a | b"),
-        "xor_bits": _on_bits("xor_bits", "a, b", "a ^ b"),
-        "add_bits": _on_bits("add_bits", "a, b", "BigInt.asUintN(64, a + b)"),
-        "sub_bits": _on_bits("sub_bits", "a, b", "BigInt.asUintN(64, a - b)"),
-        "shift_up": _on_bits("shift_up", "a, n", "BigInt.asUintN(64, a << BigInt(n))"),
-        "shift_down": _on_bits("shift_down", "a, n", "a >> BigInt(n)"),
+        **functions_on_bits(_on_bits, "a, b", "a, n", **WAYS),
         "sample": SAMPLE,
     }
     declaration, variable = "const $name = $text;", ("let $name = $text;", "let $name;")
@@ -138,12 +137,7 @@ console.log(s.$shown[0]);"""
             "turn_sign": SINGLE_TURN_SIGN,
             "mask_of": _on_bits("mask_of", "truth", "truth ? 0xffffffff : 0"),
             "choose_bits": _on_bits("choose_bits", "mask, a, b", "((mask & a) | (~mask & b)) >>> 0"),
-            "and_bits": _on_bits("and_bits", "a, b", "(a & b) >>> 0"),
-            "or_bits": _on_bits("or_bits", "a, b", "(a | b) >>> 0"),
-            "xor_bits": _on_bits("xor_bits", "a, b", "(a ^ b) >>> 0"),
-            "add_bits": _on_bits("add_bits", "a, b", "(a + b) >>> 0"),
-            "sub_bits": _on_bits("sub_bits", "a, b", "(a - b) >>> 0"),
-            "shift_up": _on_bits("shift_up", "a, n", "(a << n) >>> 0"),
+            **functions_on_bits(lambda name, arguments, way: _on_bits(name, arguments, f"({way}) >>> 0"), "a, b", "a, n"),
             "shift_down": _on_bits("shift_down", "a, n", "a >>> n"),
         },
     }

@@ -7,7 +7,7 @@ are never stored as a number, since not every language would preserve the bits o
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, ClassVar
 
 from ...errors import UnsupportedError
@@ -27,6 +27,16 @@ EVALUATION = re.compile(r"−?d?[vy](\d+)")
 
 #: The shift that moves the last bit of a number to its sign, with the number of places; it sets the sign of a sine.
 LAST_BIT = re.compile(r"\w*shift_up\(\w*bits_of\(((?:\w|\.|->)+)\), (\d+)\)")
+
+
+def functions_on_bits(written: Callable[[str, str, str], str], two: str, shift: str, **ways: str) -> dict[str, str]:
+    """The functions on bits that most languages have alike, by name; ``ways`` are the expressions that differ.
+
+    A function is ``written`` by its name, its arguments (``two`` operands, or one and the number of places) and its expression.
+    """
+    alike = {"and_bits": "a & b", "or_bits": "a | b", "xor_bits": "a ^ b", "add_bits": "a + b", "sub_bits": "a - b"}
+    alike |= {"shift_up": "a << n", "shift_down": "a >> n"} | ways
+    return {name: written(name, shift if name.startswith("shift") else two, text) for name, text in alike.items()}
 
 
 class Language(Notation):

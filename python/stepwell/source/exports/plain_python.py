@@ -7,6 +7,7 @@ from typing import Any, ClassVar
 
 from ..explanation import formula as plain
 from ..explanation.formula import CHOICE, EITHER, Formula
+from .language import functions_on_bits
 from .lines import indented
 from .names import camel
 from .skeleton import Skeleton
@@ -55,6 +56,8 @@ SAMPLE = '''def sample(samples, start, interval, t):
     return samples[int(min(i, len(samples) - 1.0)) if i > 0.0 else 0]'''
 
 ALL_BITS = "0xFFFFFFFFFFFFFFFF"
+#: Operations on bits whose results have more of them.
+TOO_LONG = {"add_bits": "a + b", "sub_bits": "a - b", "shift_up": "a << n"}
 
 SINGLE = '''def single(x):
     """Numbers rounded to float32."""
@@ -69,13 +72,7 @@ HELPERS = {
     "turn_sign": TURN_SIGN,
     "mask_of": _on_bits("mask_of", "truth", f"{ALL_BITS} if truth else 0"),
     "choose_bits": _on_bits("choose_bits", "mask, a, b", "(mask & a) | (~mask & b)"),
-    "and_bits": _on_bits("and_bits", "a, b", "a & b"),
-    "or_bits": _on_bits("or_bits", "a, b", "a | b"),
-    "xor_bits": _on_bits("xor_bits", "a, b", "a ^ b"),
-    "add_bits": _on_bits("add_bits", "a, b", f"(a + b) & {ALL_BITS}"),
-    "sub_bits": _on_bits("sub_bits", "a, b", f"(a - b) & {ALL_BITS}"),
-    "shift_up": _on_bits("shift_up", "a, n", f"(a << n) & {ALL_BITS}"),
-    "shift_down": _on_bits("shift_down", "a, n", "a >> n"),
+    **functions_on_bits(_on_bits, "a, b", "a, n", **{name: f"({way}) & {ALL_BITS}" for name, way in TOO_LONG.items()}),
 }
 
 

@@ -6,6 +6,7 @@ from typing import Any, ClassVar
 
 from ...base.arrays import Shape
 from ..explanation.formula import Formula
+from .language import functions_on_bits
 from .lines import indented
 from .names import camel
 from .program import FORCE
@@ -41,13 +42,7 @@ HELPERS = {
     "turn_sign": TURN_SIGN,
     "mask_of": _on_bits("mask_of", "truth: bool", "if truth { u64::MAX } else { 0 }"),
     "choose_bits": _on_bits("choose_bits", "mask: u64, a: u64, b: u64", "(mask & a) | (!mask & b)"),
-    "and_bits": _on_bits("and_bits", TWO, "a & b"),
-    "or_bits": _on_bits("or_bits", TWO, "a | b"),
-    "xor_bits": _on_bits("xor_bits", TWO, "a ^ b"),
-    "add_bits": _on_bits("add_bits", TWO, "a.wrapping_add(b)"),
-    "sub_bits": _on_bits("sub_bits", TWO, "a.wrapping_sub(b)"),
-    "shift_up": _on_bits("shift_up", SHIFT, "a << n"),
-    "shift_down": _on_bits("shift_down", SHIFT, "a >> n"),
+    **functions_on_bits(_on_bits, TWO, SHIFT, add_bits="a.wrapping_add(b)", sub_bits="a.wrapping_sub(b)"),
 }
 
 

@@ -355,13 +355,7 @@ class Written:
         else:
             lines = Statements(branched, writer, leaf, leaves, part.roots, part.results).lines
         writes = places(part.results)
-        return Function(
-            [reads[i] for i in sorted(reads)],
-            "time" in leaf_names,
-            of_time_lines,
-            lines,
-            writes,
-        )
+        return Function([reads[i] for i in sorted(reads)], "time" in leaf_names, of_time_lines, lines, writes)
 
     def _assignment(self, line: Line) -> Assignment:
         return self.language.assignment(line)

@@ -274,7 +274,6 @@ class Advice:
 
         Raises:
             ArgumentError: if no method is good enough, or there is no such format.
-            UnsupportedError: if matplotlib is missing.
 
         Example:
             >>> import stepwell as sw

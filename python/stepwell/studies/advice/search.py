@@ -226,7 +226,9 @@ class Search:
                 best = min(best, cost)
                 continue
             wanted = self.wanted(candidate, k, trial)
-            least = max(2.0, (wanted or self.at_least(candidate, k, trial)) / k / PREDICTION_FACTOR)
+            # With the k predicted for a long run that was stopped, the run is good enough up to that point.
+            needed = wanted or (self.ordered(candidate, k, trial.before) if trial.stopped else 0)
+            least = max(2.0, needed / k / PREDICTION_FACTOR)
             kind = "unstable" if trial.unstable else "inaccurate"
             # The cost of a run with a tolerance that stopped early says nothing about one that does not.
             stopped = trial.unstable and candidate.by == "tolerance"
@@ -245,10 +247,6 @@ class Search:
     def wanted(self, candidate: Candidate, k: int, trial: Trial) -> int | None:
         """The k predicted by the order of the method, if the error is small enough for a prediction."""
         return self.ordered(candidate, k, trial.error) if trial.error < ASYMPTOTIC_ERROR else None
-
-    def at_least(self, candidate: Candidate, k: int, trial: Trial) -> int:
-        """The k predicted by the order for a long run that was stopped: with it the run is good enough up to that point."""
-        return self.ordered(candidate, k, trial.before) if trial.stopped else 0
 
     def ordered(self, candidate: Candidate, k: int, error: float) -> int:
         """The k that is good enough if the error falls by the order of the method from that of this k."""

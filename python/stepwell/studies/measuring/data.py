@@ -240,9 +240,6 @@ class WorkPrecision(Drawn, Table, ValueEquality):
             path: the file to write, or None; its ending is that of the format.
             error: the error to show: ``"state_error"``, ``"end_error"``, ``"phase_error"``, ``"energy_error"``.
             time: whether measured times are those of a ``"batch"`` or of a ``"single"`` run.
-
-        Raises:
-            UnsupportedError: if matplotlib is missing.
         """
         return drawn(path, lambda: self.draw(error, time))
 

@@ -163,7 +163,10 @@ def sweep(
     arguments = {name: value for name, value in fixed.items() if value is not None}
     arguments |= {"t0": asked["t0"], "fused": asked["fused"], "threads": 1} | _the_same_for_all(asked)
     if single := asked["dtype"]:
-        _fits_single(grid)
+        for axis in grid.axes:  # raises for numbers that float32 does not have
+            checks.fits_single(f"axes: {axis.argument}", axis.values)
+            if axis.argument == "dt":
+                float32.rounded_step(float(axis.values.min()))
         arguments["dtype"] = "float32"
     if (machine := asked["device"]) is not None:
         from ...device import promise  # only such sweeps need it
@@ -266,14 +269,6 @@ def _takes(maker: Callable[..., Any], parameters: Sequence[str]) -> None:
     except TypeError as error:
         names = ", ".join(parameters)
         raise DTypeError(f"system: expected a function of {names} by name, got one that cannot be called so: {error}") from None
-
-
-def _fits_single(grid: Grid) -> None:
-    """Raise if members have numbers that float32 does not have."""
-    for axis in grid.axes:
-        checks.fits_single(f"axes: {axis.argument}", axis.values)
-        if axis.argument == "dt":
-            float32.rounded_step(float(axis.values.min()))
 
 
 def _outcomes(outcomes: Any, every: int | None) -> tuple[Outcome, ...]:

@@ -39,7 +39,7 @@ LEAST_DRAWN, ROUNDING = 1e-17, 1e-12
 
 def draw(chart: ControlSweep) -> Figure:
     """Draw the chart on a new figure."""
-    rows = 0.42 * len(_methods(chart))
+    rows = 0.42 * len(methods_of(chart))
     height = 5.7 + rows
     with page(WIDTH, height, dpi=DPI) as figure:
         kinds = ("energy_error", "state_error" if chart.exact else "largest")
@@ -53,7 +53,7 @@ def draw(chart: ControlSweep) -> Figure:
         evaluations = ", ".join(map(str, chart.evaluations))
         what = f"{chart.horizon:.6g} units of time, {evaluations} function evaluations per run"
         figure.text(0.012, 1.0 - 0.74 / height, textwrap.shorten(what, 120), size=13, color=GREY)
-        few = "" if len(_swept(chart)) == len(_methods(chart)) else ", of the methods that it helps most and least"
+        few = "" if len(_swept(chart)) == len(methods_of(chart)) else ", of the methods that it helps most and least"
         note = (
             "Above: hollow without control, full the median of all gains of the limited form. At the left edge: rounding alone.\n"
             f"Below: each gain{few}; solid the limited form, dotted the printed one; in the strip: diverged.\n"
@@ -99,27 +99,29 @@ def _swept(chart: ControlSweep) -> list[Method]:
     chosen = (
         [max(known, key=lambda method: known[method]), min(known, key=lambda method: known[method])] if len(known) > 1 else []
     )
-    return [method for method in _methods(chart) if method in chosen or not chosen]
+    return [method for method in methods_of(chart) if method in chosen or not chosen]
 
 
-def _look(chart: ControlSweep, method: Method) -> dict[str, Any]:
-    return apart(_methods(chart), method)
+def look_of(chart: ControlSweep, method: Method) -> dict[str, Any]:
+    """Keywords for the lines of a method, each of which has a colour of its own."""
+    return apart(methods_of(chart), method)
 
 
-def _methods(chart: ControlSweep) -> list[Method]:
+def methods_of(chart: ControlSweep) -> list[Method]:
+    """The methods of a chart, each once."""
     return list({line.method.name: line.method for line in chart.lines}.values())
 
 
 def _before_and_after(axes: Axes, chart: ControlSweep, what: str, name: str, *, named: bool) -> None:
     """A row for each method: an error without control, and with it."""
-    methods = _methods(chart)
+    methods = methods_of(chart)
     values = np.concatenate([getattr(line, what) for line in chart.lines if line.kind in ("none", "limited")] or [np.ones(1)])
     values = values[np.isfinite(values) & (values > ROUNDING)]
     low, high = (0.3 * values.min(), 3.0 * values.max()) if values.size else (LEAST_DRAWN, 1.0)
     axes.set(xscale="log", xlim=(low, high), ylim=(len(methods) - 0.5, -0.95))
     told = False
     for row, method in enumerate(methods):
-        colour = _look(chart, method)["color"]
+        colour = look_of(chart, method)["color"]
         of = [line for line in chart.lines if line.method == method]
         limited = np.concatenate([getattr(line, what) for line in of if line.kind == "limited"] or [np.empty(0)])
         limited = np.maximum(limited[np.isfinite(limited)], low)
@@ -138,7 +140,7 @@ def _before_and_after(axes: Axes, chart: ControlSweep, what: str, name: str, *, 
                 axes.annotate(word, (at, row), (7 if side == "left" else -7, 9), textcoords="offset points", size=11.5, ha=side)
     axes.set_yticks(range(len(methods)), [method.title for method in methods] if named else [""] * len(methods))
     for tick, method in zip(axes.get_yticklabels(), methods, strict=True):
-        tick.set_color(ink(_look(chart, method)["color"]))
+        tick.set_color(ink(look_of(chart, method)["color"]))
         tick.set_fontweight("bold")
         tick.set_fontsize(13.0)
     axes.tick_params(axis="y", length=0, pad=9)
@@ -149,8 +151,6 @@ def _before_and_after(axes: Axes, chart: ControlSweep, what: str, name: str, *, 
 
 def _over_gains(axes: Axes, chart: ControlSweep, what: str, name: str) -> None:
     """The errors over the gain, and above them the diverged runs."""
-    from matplotlib.patches import Rectangle
-
     gains = np.unique(np.concatenate([line.relative[np.isfinite(line.relative)] for line in chart.lines] or [np.ones(1)]))
     low, high = (gains[0], gains[-1]) if gains.size else (1e-1, 1e1)
     wide = max(float(np.log10(high / low)), 1.0)
@@ -159,17 +159,17 @@ def _over_gains(axes: Axes, chart: ControlSweep, what: str, name: str) -> None:
     axes.set_xlim(low / 10 ** (0.02 * wide), high * 10 ** (0.02 * wide))
     axes.axvline(1.0, color=GREY, linewidth=0.9)
     axes.grid(which="major", color="#dddddd", linewidth=0.8)
-    below: dict[str, Any] = {"transform": axes.transAxes, "facecolor": "#eeeeee", "clip_on": False, "zorder": 0}
-    axes.add_patch(Rectangle((0.0, 1.0), 1.0, STRIP, **below))
+    strip(axes)
     axes.text(1.012, 1.0 + 0.5 * STRIP, "diverged", transform=axes.transAxes, size=12, color=GREY, va="center")
     methods = _swept(chart)
     ends = []
     for line in (each for each in chart.lines if each.kind in FORMS and each.method in methods):
         values = np.maximum(getattr(line, what), LEAST_DRAWN)
         shown = np.where(np.isfinite(values), values, np.nan)
-        look = _look(chart, line.method) | FORMS[line.kind]
-        axes.plot(line.relative, shown, **look, markevery=_every(line, methods))
-        _strip(axes, line, ~np.isfinite(values), methods, look)
+        look = look_of(chart, line.method) | FORMS[line.kind]
+        step = max(1, len(line.relative) // 8)  # between markers, those of each method at other points
+        axes.plot(line.relative, shown, **look, markevery=(methods.index(line.method) % step, step))
+        mark_lost(axes, line, ~np.isfinite(values), (methods.index(line.method) + 0.5) / len(methods), look)
         if line.kind == "limited" or not any(each.kind == "limited" for each in chart.lines):
             known = np.flatnonzero(np.isfinite(shown))
             ends += [(float(gains[-1]), float(shown[i]), line.method.title, str(look["color"])) for i in known[-1:]]
@@ -177,16 +177,16 @@ def _over_gains(axes: Axes, chart: ControlSweep, what: str, name: str) -> None:
     at_ends(axes, ends, 12.0, ROOM)
 
 
-def _every(line: Held, methods: list[Method]) -> tuple[int, int]:
-    """Markers on every third point, those of each method at others."""
-    step = max(1, len(line.relative) // 8)
-    return methods.index(line.method) % step, step
+def strip(axes: Axes) -> None:
+    """The grey strip above the frame."""
+    from matplotlib.patches import Rectangle
+
+    below: dict[str, Any] = {"transform": axes.transAxes, "facecolor": "#eeeeee", "clip_on": False, "zorder": 0}
+    axes.add_patch(Rectangle((0.0, 1.0), 1.0, STRIP, **below))
 
 
-def _strip(axes: Axes, line: Held, lost: Any, methods: list[Method], look: dict[str, Any]) -> None:
-    """Markers above the frame, a row for each method, where runs were lost."""
-    if not lost.any():
-        return
-    height = 1.0 + STRIP * (methods.index(line.method) + 0.5) / len(methods)
-    style = look | {"linestyle": "none", "clip_on": False, "markersize": 4.0}
-    axes.plot(line.relative[lost], np.full(lost.sum(), height), transform=axes.get_xaxis_transform(), **style)
+def mark_lost(axes: Axes, line: Held, lost: Any, share: float, look: dict[str, Any]) -> None:
+    """Markers in the strip, at this share of its height, where runs were lost."""
+    if lost.any():
+        style = look | {"linestyle": "none", "clip_on": False, "markersize": 4.0}
+        axes.plot(line.relative[lost], np.full(lost.sum(), 1.0 + STRIP * share), transform=axes.get_xaxis_transform(), **style)

@@ -5,18 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
-from ...model.systems import (
-    Aircraft,
-    Chain,
-    NBody,
-    Particles,
-    Pendulum3D,
-    RestrictedThreeBody,
-    RigidBody,
-    Rods,
-    Springs,
-    System,
-)
+from ...model.systems import Aircraft, Chain, NBody, Particles, Pendulum3D, RestrictedThreeBody, RigidBody, Rods, Springs, System
 
 
 class FixedPoint(NamedTuple):

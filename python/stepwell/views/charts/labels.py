@@ -52,7 +52,8 @@ def beside(axes: Axes, labels: Sequence[Label], keep_off: Sequence[tuple[float, 
     taken += keep_off
     left: list[str] = []
     for label, curve in zip(labels, curves, strict=True):
-        text = axes.text(0.0, 0.0, label.text, transform=None, ha="left", va="bottom", zorder=6, **_dark(label.style))
+        style = label.style | ({"color": ink(label.style["color"])} if "color" in label.style else {})
+        text = axes.text(0.0, 0.0, label.text, transform=None, ha="left", va="bottom", zorder=6, **style)
         size = text.get_window_extent(renderer)
         width, height = size.width + 2 * AIR, size.height + 2 * AIR
         best: tuple[float, float, float] | None = None
@@ -130,11 +131,6 @@ def title(figure: Figure, x: float, y: float, text: str, size: float) -> None:
     room = figure.bbox.width * (1.0 - x) - 10.0
     if box.width > room:
         drawn.set_fontsize(0.98 * size * room / box.width)  # letters do not shrink quite in proportion
-
-
-def _dark(style: dict[str, Any]) -> dict[str, Any]:
-    """The keywords of a text, in a colour that can be read."""
-    return style | ({"color": ink(style["color"])} if "color" in style else {})
 
 
 def _pixels(axes: Axes, points: Array) -> Array:

@@ -7,20 +7,14 @@ from typing import Any
 
 import numpy as np
 
-from ...model.methods import Method
 from .control import ControlSweep
+from .control_picture import LEAST_DRAWN, STRIP, look_of, mark_lost, methods_of, strip
 from .control_runs import Held
-from .style import GREY, Axes, Figure, apart, page
-
-#: Least error drawn: zero has no place on a logarithmic axis.
-LEAST_DRAWN = 1e-17
+from .style import GREY, Axes, Figure, page
 
 #: The lines of the two, told apart without colour.
 CONTROL: dict[str, Any] = {"linestyle": "-", "linewidth": 2.0, "markersize": 6.0}
 RESETTING: dict[str, Any] = {"linestyle": (0, (4, 2)), "linewidth": 1.6, "marker": ""}
-
-#: Height of the strip of diverged runs, as a share of that of the panel below it.
-STRIP = 0.1
 
 #: Letters of a line of the title, its height, where what is below it begins, and the height of the name of a column.
 LINE, LINE_HEIGHT, HEAD, COLUMN_TITLE = 84, 0.036, 0.93, 0.035
@@ -34,16 +28,15 @@ def draw(chart: ControlSweep) -> Figure:
     count = len(chart.evaluations)
     with page(13.0, 9.4) as figure:
         head = textwrap.wrap(chart.answer or f"{chart.title}: lengths under control", LINE, break_on_hyphens=False)
-        strip = STRIP
-        gap = strip + 0.02
+        gap = STRIP + 0.02
         # Two frames, each with its strip above, below the title and the name of the column.
-        share = strip / (2.0 + gap)
-        bottom = BOTTOM + LEGEND_ROW * -(-(len(_firsts(chart)) + 2) // LEGEND_COLUMNS)
+        share = STRIP / (2.0 + gap)
+        bottom = BOTTOM + LEGEND_ROW * -(-(len(methods_of(chart)) + 2) // LEGEND_COLUMNS)
         top = (HEAD - LINE_HEIGHT * len(head) - COLUMN_TITLE + share * bottom) / (1.0 + share)
         places = {"left": 0.075, "right": 0.985, "bottom": bottom, "top": top, "wspace": 0.07, "hspace": gap}
         panels = figure.subplots(2, count, squeeze=False, sharex=True, sharey="row", gridspec_kw=places)
         for i, evaluations in enumerate(chart.evaluations):
-            _column(panels[:, i], chart, evaluations, strip)
+            _column(panels[:, i], chart, evaluations)
         what = "state_error" if chart.exact else "energy_error"
         panels[0, 0].set_ylabel("error of the last state, relative" if chart.exact else "largest |E − E₀|, relative")
         panels[1, 0].set_ylabel("largest error of a length")
@@ -57,44 +50,32 @@ def draw(chart: ControlSweep) -> Figure:
     return figure
 
 
-def _column(panels: Any, chart: ControlSweep, evaluations: int, strip: float) -> None:
+def _column(panels: Any, chart: ControlSweep, evaluations: int) -> None:
     """One number of evaluations: the state's error above, that of the lengths below."""
-    from matplotlib.patches import Rectangle
-
     above, below = panels
-    methods = list(dict.fromkeys(line.method.name for line in chart.lines))
+    methods = [method.name for method in methods_of(chart)]
     for axes, what in ((above, "state_error" if chart.exact else "energy_error"), (below, "length_error")):
         axes.set(xscale="log", yscale="log")
         axes.grid(which="major", color="#dddddd", linewidth=0.8)
         axes.minorticks_off()
-        grey: dict[str, Any] = {"transform": axes.transAxes, "facecolor": "#eeeeee", "clip_on": False, "zorder": 0}
-        axes.add_patch(Rectangle((0.0, 1.0), 1.0, STRIP, **grey))
+        strip(axes)
         for row, name in enumerate(methods):
             kinds = {line.kind: chart.line(name, line.kind, evaluations) for line in chart.lines if line.method.name == name}
             if (controlled := kinds.get("control")) is not None:
                 _curve(axes, chart, controlled, getattr(controlled, what), row, len(methods))
             reset = kinds.get("length")
             if reset is not None and what != "length_error" and np.isfinite(getattr(reset, what)[0]):
-                axes.axhline(max(getattr(reset, what)[0], LEAST_DRAWN), **(_look(chart, reset.method) | RESETTING))
-    above.text(0.0, 1.0 + strip, f"{evaluations} function evaluations", size=13.5, transform=above.transAxes)
+                axes.axhline(max(getattr(reset, what)[0], LEAST_DRAWN), **(look_of(chart, reset.method) | RESETTING))
+    above.text(0.0, 1.0 + STRIP, f"{evaluations} function evaluations", size=13.5, transform=above.transAxes)
     below.set_xlabel("gain c of the control")
-
-
-def _look(chart: ControlSweep, method: Method) -> dict[str, Any]:
-    return apart([line.method for line in _firsts(chart)], method)
 
 
 def _curve(axes: Axes, chart: ControlSweep, line: Held, values: Any, row: int, rows: int) -> None:
     """The errors of a method over c, and marks above the frame where its runs diverged."""
-    style = _look(chart, line.method) | CONTROL
+    style = look_of(chart, line.method) | CONTROL
     fine = np.isfinite(values)
     axes.plot(line.relative, np.where(fine, np.maximum(values, LEAST_DRAWN), np.nan), **style, markevery=(row, rows))
-    if not fine.all():
-        height = 1.0 + STRIP * (row + 0.5) / rows
-        above: dict[str, Any] = {"transform": axes.get_xaxis_transform(), "clip_on": False}
-        axes.plot(
-            line.relative[~fine], np.full((~fine).sum(), height), **(style | {"linestyle": "none", "markersize": 4.0}), **above
-        )
+    mark_lost(axes, line, ~fine, (row + 0.5) / rows, style)
 
 
 def _limits(axes: Axes, chart: ControlSweep, what: str) -> None:
@@ -109,8 +90,8 @@ def _limits(axes: Axes, chart: ControlSweep, what: str) -> None:
 def _legend(figure: Figure, chart: ControlSweep) -> None:
     from matplotlib.lines import Line2D
 
-    handles: list[Any] = [Line2D([], [], **(_look(chart, line.method) | CONTROL)) for line in _firsts(chart)]
-    labels = [line.method.title for line in _firsts(chart)]
+    handles: list[Any] = [Line2D([], [], **(look_of(chart, each) | CONTROL)) for each in methods_of(chart)]
+    labels = [each.title for each in methods_of(chart)]
     handles += [Line2D([], [], color=GREY, **CONTROL), Line2D([], [], color=GREY, **RESETTING)]
     labels += ["under control", "lengths reset after every step"]
     figure.legend(
@@ -128,10 +109,3 @@ def _legend(figure: Figure, chart: ControlSweep) -> None:
         "Reset lengths are exact to rounding, and not drawn."
     )
     figure.text(0.012, 0.012, note, size=12, color=GREY, linespacing=1.3)
-
-
-def _firsts(chart: ControlSweep) -> list[Held]:
-    firsts: dict[str, Held] = {}
-    for line in chart.lines:
-        firsts.setdefault(line.method.name, line)
-    return list(firsts.values())

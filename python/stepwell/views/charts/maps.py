@@ -131,7 +131,6 @@ class StabilityMap(Table, ValueEquality):
 
         Raises:
             ArgumentError: if it is too small for an area.
-            UnsupportedError: if matplotlib is missing.
         """
         if min(self.radius.shape) < 2:
             raise ArgumentError(f"plot: expected a map of 2 × 2 points or more, got one of shape {self.radius.shape}")

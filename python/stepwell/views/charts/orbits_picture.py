@@ -9,7 +9,7 @@ import numpy as np
 
 from ...base.arrays import Array
 from ...model.systems import NBody
-from .run_panels import Points, falling, on_plane
+from .run_panels import Points, falling, is_hanging, on_plane, view_of
 from .runs import LARGEST, RunPicture
 from .style import BOTTOM, EXACT, FAMILIES, GREY, LONG_CURVE, TOP, Axes, Figure
 
@@ -48,27 +48,22 @@ def draw_orbits(figure: Figure, chart: RunPicture) -> list[str]:
     """
     if chart.before is not None:
         return _before_and_after(figure, chart, chart.before)
-    planes = ((0, 1),) if chart.places.shape[2] == 2 or hanging(chart) else ((0, 1), (0, 2))
-    views = [falling(chart)] if hanging(chart) else [on_plane(chart, plane) for plane in planes]
+    planes = ((0, 1),) if chart.places.shape[2] == 2 or is_hanging(chart) else ((0, 1), (0, 2))
+    views = [falling(chart)] if is_hanging(chart) else [on_plane(chart, plane) for plane in planes]
     size = max(view.half for view in views)
     side, gap, left = (0.44, 0.0, 0.065) if len(planes) == 1 else (0.28, 0.065, 0.058)
     for i, (plane, view) in enumerate(zip(planes, views, strict=True)):
         axes = figure.add_axes((left + i * (side + gap), BOTTOM, side, TOP - BOTTOM))
         square(axes, view, size, plane)
         _paths(axes, chart, view)
-        if hanging(chart):
+        if is_hanging(chart):
             axes.set(xlabel="", ylabel="", xticks=[], yticks=[])
             axes.set_title("", loc="left")
         if i == 0:
             _legend(axes, chart, crowded(chart, 2.0 * size), above=len(planes) == 1)
     notes = ["A body leaves the picture."] * any(view.leave(size) for view in views)
-    notes += [f"The motion is {views[0].name}."] * hanging(chart)
+    notes += [f"The motion is {views[0].name}."] * is_hanging(chart)
     return [*notes, "Broad: where each body went last."] if one_curve(chart) else notes
-
-
-def hanging(chart: RunPicture) -> bool:
-    """True if points in space hang on something or on each other, so that they are seen from the front and not along an axis."""
-    return bool(chart.places.shape[2] == 3 and (len(chart.links) or chart.fixed_points))
 
 
 def is_net(chart: RunPicture) -> bool:
@@ -80,7 +75,7 @@ def draw_net(figure: Figure, chart: RunPicture, right: float) -> list[str]:
     """Draw a net at several times, one above the other or two side by side. Return notes."""
     from matplotlib.collections import LineCollection
 
-    view = falling(chart) if hanging(chart) else on_plane(chart)
+    view = view_of(chart)
     finite = np.flatnonzero(chart.finite)
     shown = finite[np.round(np.linspace(0, len(finite) - 1, NET_TIMES)).astype(int)]
     points = view.places[shown]

@@ -38,11 +38,7 @@ class Panel(Drawn, Table, ValueEquality):
         return figure
 
     def plot(self, path: str | Path | None = None, *, error: str = "state_error") -> Figure:
-        """Draw the scenes beside each other, and write the picture to ``path`` if given; ``error`` as of ``WorkPrecision.plot``.
-
-        Raises:
-            UnsupportedError: if matplotlib is missing.
-        """
+        """Draw the scenes beside each other, and write the picture to ``path`` if given; ``error`` as of a single chart."""
         return drawn(path, lambda: self.draw(error))
 
     def rows(self) -> list[dict[str, Any]]:

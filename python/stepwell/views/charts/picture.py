@@ -33,12 +33,7 @@ ERRORS = {
     "energy_error": "largest energy error of the run, relative",
 }
 #: The word before "digits" in a title, by kind of error; empty means the state.
-DIGITS_OF = {
-    "state_error": "",
-    "end_error": " at the end",
-    "phase_error": " of the phase",
-    "energy_error": " of the energy",
-}
+DIGITS_OF = {"state_error": "", "end_error": " at the end", "phase_error": " of the phase", "energy_error": " of the energy"}
 COUNTED = "function evaluations per unit of simulated time"
 TIMES = {"batch": "batch", "single": "single run"}
 
@@ -238,7 +233,7 @@ def title_of(name: str) -> str:
 def _text(figure: Figure, chart: WorkPrecision, error: str, time: str, unnamed: list[str]) -> None:
     scene = chart.scene
     put_title(figure, 0.012, 0.95, f"{scene.title}: {finding(chart, error)}", 20)
-    parts = [f"{scene.horizon:.4g} units of time{known_to(chart)}"]
+    parts = [f"{scene.horizon:.4g} units of time{', as far as the true motion is known' * bool(chart.cut)}"]
     parts += [str(chart.stiff)] if chart.stiff else []
     parts += [f"Hoffmann (2002), {scene.section}"] if scene.section.startswith("§") else []
     figure.text(0.012, 0.908, textwrap.shorten("; ".join(parts), NOTE - 15), size=13, color=GREY)
@@ -274,8 +269,3 @@ def not_applicable(chart: WorkPrecision) -> list[str]:
 def in_short(name: str, reason: str) -> str:
     """The reason alone: without the method's name before it, the system's numbers and what to do instead."""
     return re.sub(r", but \w+\(.*\) has (.*?)(?:;.*)?$", r"; here: \1", reason).removeprefix(f"{name} ")
-
-
-def known_to(chart: WorkPrecision) -> str:
-    """The note that a chart ends where the true motion is no longer known, if it does."""
-    return ", as far as the true motion is known" if chart.cut else ""

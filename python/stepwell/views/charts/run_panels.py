@@ -6,7 +6,7 @@ The picture, the frames of an animation and the page each draw these.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -208,7 +208,7 @@ def on_plane(chart: RunPicture, plane: tuple[int, int] = (0, 1)) -> Points:
 
 
 def view_of(chart: RunPicture) -> Points:
-    """The points as an animation shows them: those that hang from the front and above, others along an axis."""
+    """The points as they are seen: those that hang from the front and above, others along an axis."""
     return falling(chart) if is_hanging(chart) else on_plane(chart)
 
 
@@ -235,7 +235,7 @@ def _in_square(points: Points, shown: Array) -> Points:
     shown = np.concatenate([shown, *(np.array([each.place]) for each in points.fixed)])
     low, high = shown.min(axis=0), shown.max(axis=0)
     half = 0.54 * float((high - low).max())
-    return Points(points.places, points.exact, points.fixed, 0.5 * (low + high), half, points.name)
+    return replace(points, centre=0.5 * (low + high), half=half)
 
 
 # ---- coordinates side by side

@@ -163,12 +163,7 @@ class RunPicture(Drawn, Table, ValueEquality):
         return self.scene.exact(t) if self.scene.exact is not None and t[-1] <= self.scene.until else None
 
     def animate(
-        self,
-        path: str | Path,
-        *,
-        seconds: float = 10.0,
-        fps: float = 20.0,
-        progress: Callable[[float], object] | None = None,
+        self, path: str | Path, *, seconds: float = 10.0, fps: float = 20.0, progress: Callable[[float], object] | None = None
     ) -> None:
         """Write an animation of the run; its frames are the saved states.
 

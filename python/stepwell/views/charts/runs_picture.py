@@ -8,8 +8,8 @@ import numpy as np
 
 from .kinds import kind_of
 from .labels import title
-from .orbits_picture import draw_net, draw_orbits, hanging, is_net, radii, turning
-from .run_panels import swings
+from .orbits_picture import draw_net, draw_orbits, is_net, radii, turning
+from .run_panels import is_hanging, swings
 from .runs import LARGEST, RunPicture
 from .runs_finding import broke_off, finding, steps_of
 from .series_picture import draw_column, draw_errors, over_time
@@ -38,7 +38,7 @@ def _orbits(figure: Figure, chart: RunPicture) -> list[str]:
         _errors_beside(figure, chart, 0.71)
         return notes
     notes = draw_orbits(figure, chart)
-    left = 0.55 if (chart.places.shape[2] == 2 or hanging(chart)) and chart.before is None else 0.735
+    left = 0.55 if (chart.places.shape[2] == 2 or is_hanging(chart)) and chart.before is None else 0.735
     if turning(chart):
         radii(figure.add_axes((left, 0.68, RIGHT - left, TOP - 0.68)), chart)
         draw_errors(figure, chart, (left, 0.4225, RIGHT - left, 0.145), (left, BOTTOM, RIGHT - left, 0.145))

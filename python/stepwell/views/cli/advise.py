@@ -46,15 +46,7 @@ def command(args: argparse.Namespace) -> None:
     dtype: Dtypes = "both" if args.float32 else "float64"
     with show.progress(chosen.title, args) as progress:
         advice = advise(
-            chosen,
-            frame,
-            args.tolerance,
-            args.budget,
-            methods,
-            cost=args.cost,
-            fixed=args.fixed,
-            dtype=dtype,
-            progress=progress,
+            chosen, frame, args.tolerance, args.budget, methods, cost=args.cost, fixed=args.fixed, dtype=dtype, progress=progress
         )
     written = show.Written()
     written.write(args.output, advice.to_json)

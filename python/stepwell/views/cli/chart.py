@@ -109,14 +109,7 @@ def _summary(chart: WorkPrecision, files: list[str], error: str) -> None:
         reasons.setdefault(reason.removeprefix(f"{name} "), []).append(title_of(name))
     show.table(
         "Function evaluations per unit of time for an error",
-        (
-            "method",
-            "order>",
-            *(f"error {target:g}>" for target in TARGETS),
-            "least error>",
-            "stable to dt>",
-            "ns a step>",
-        ),
+        ("method", "order>", *(f"error {target:g}>" for target in TARGETS), "least error>", "stable to dt>", "ns a step>"),
         rows,
         ([f"stiff: {chart.stiff}"] if chart.stiff else [])
         + [f"not applicable: {', '.join(names)} ({reason})" for reason, names in reasons.items()]

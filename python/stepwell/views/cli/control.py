@@ -73,12 +73,7 @@ def _numbers(option: str, text: str, kind: type[int] | type[float]) -> list[Any]
 
 def _summary(chart: ControlSweep, files: list[str]) -> None:
     rows = [
-        (
-            title_of(row["method"]),
-            row["kind"],
-            f"{row['dt']:.4g}",
-            *(show.number(row[name]) for name in LEAST),
-        )
+        (title_of(row["method"]), row["kind"], f"{row['dt']:.4g}", *(show.number(row[name]) for name in LEAST))
         for row in chart.summary()
     ]
     show.table(

@@ -32,15 +32,7 @@ def command(args: argparse.Namespace) -> None:
         "Methods",
         ("method", "order>", "function evaluations>", "oscillator stable for", "title", "also called", HOFFMANN),
         [
-            (
-                m.name,
-                str(m.order),
-                str(m.evaluations),
-                stable_for(m.limit),
-                m.title,
-                "; ".join(m.other_names),
-                section(m.section),
-            )
+            (m.name, str(m.order), str(m.evaluations), stable_for(m.limit), m.title, "; ".join(m.other_names), section(m.section))
             for m in methods()
         ],
         [_record(m) for m in methods()],

@@ -59,10 +59,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--tolerance", type=float, metavar="E", help="take adaptive steps with an estimated error below this")
     options.start(parser)
     parser.add_argument(
-        "--form",
-        default="direct",
-        choices=FORMS,
-        help="step by the method's formulas (direct) or by the transition matrix",
+        "--form", default="direct", choices=FORMS, help="step by the method's formulas (direct) or by the transition matrix"
     )
     parser.add_argument(
         "--control",
