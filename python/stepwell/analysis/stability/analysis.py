@@ -195,6 +195,10 @@ class Analysis(ValueEquality):
         Returns:
             The figure; a notebook shows it.
 
+        Raises:
+            ArgumentError: if there is no such format.
+            UnsupportedError: if matplotlib is missing.
+
         Example:
             >>> import stepwell as sw
             >>> figure = sw.analyse(sw.Oscillator(), "rk4", dt=0.5).plot()

@@ -240,6 +240,10 @@ class WorkPrecision(Drawn, Table, ValueEquality):
             path: the file to write, or None; its ending is that of the format.
             error: the error to show: ``"state_error"``, ``"end_error"``, ``"phase_error"``, ``"energy_error"``.
             time: whether measured times are those of a ``"batch"`` or of a ``"single"`` run.
+
+        Raises:
+            ArgumentError: if there is no such error, time or format.
+            UnsupportedError: if matplotlib is missing.
         """
         return drawn(path, lambda: self.draw(error, time))
 

@@ -139,6 +139,10 @@ class Figures(Table, ValueEquality):
         Args:
             path: the file.
             method: a method's name for its own figure; None for all in one.
+
+        Raises:
+            ArgumentError: if that method is not here.
+            UnsupportedError: if matplotlib is missing.
         """
         if method is None:
             return drawn(path, lambda: registry.task("draw_figures")(self))
@@ -150,7 +154,12 @@ class Figures(Table, ValueEquality):
         return drawn(path, lambda: registry.task("draw_figure")(self, shown[0]))
 
     def plot_harmonic(self, path: str | Path | None = None) -> Figure:
-        """Draw the harmonic cases of §4, and write the picture to ``path`` if given."""
+        """Draw the harmonic cases of §4, and write the picture to ``path`` if given.
+
+        Raises:
+            ArgumentError: if they are not here.
+            UnsupportedError: if matplotlib is missing.
+        """
         if not self.harmonic:
             raise ArgumentError("figures: the harmonic cases of §4 are among all figures only, and methods were chosen")
         return drawn(path, lambda: registry.task("draw_harmonic_figures")(self.harmonic))
@@ -162,6 +171,10 @@ class Figures(Table, ValueEquality):
 
         Args:
             folder: the folder, which is created if it does not exist.
+
+        Raises:
+            ArgumentError: if nothing can be written there.
+            UnsupportedError: if matplotlib is missing.
         """
         from ...base.pictures import new_figure
 

@@ -38,7 +38,12 @@ class Panel(Drawn, Table, ValueEquality):
         return figure
 
     def plot(self, path: str | Path | None = None, *, error: str = "state_error") -> Figure:
-        """Draw the scenes beside each other, and write the picture to ``path`` if given; ``error`` as of a single chart."""
+        """Draw the scenes beside each other, and write the picture to ``path`` if given; ``error`` as of a single chart.
+
+        Raises:
+            ArgumentError: if there is no such error or format.
+            UnsupportedError: if matplotlib is missing.
+        """
         return drawn(path, lambda: self.draw(error))
 
     def rows(self) -> list[dict[str, Any]]:

@@ -119,6 +119,10 @@ class Stability(Table, ValueEquality):
         Args:
             path: the file.
             kind: ``"loci"``: the eigenvalues in the z-plane; ``"curves"``: r₁² and Ψ/Φ over Φ.
+
+        Raises:
+            UnknownNameError: if there is no such kind.
+            UnsupportedError: if matplotlib is missing.
         """
         kind = checks.known("kind", kind, KINDS)
         return drawn(path, lambda: registry.task(f"draw_{kind}")(self))
