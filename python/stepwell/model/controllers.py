@@ -26,6 +26,7 @@ from ..reference.signal import Constant
 from .around import Part
 from .equations.by_name import reduced
 from .equations.namespace import rebound
+from .equations.series import symbols
 from .equations.trace import kind_of, run_function, scalars
 from .equations.values import Scalar, array, objects
 from .parameters import aligned
@@ -439,10 +440,10 @@ class Controller(Part):
     def _traced(self, system: System, tape: _core.Tape, places: dict[str, int]) -> list[_core.Symbol]:
         """The results computed from symbols; its parameters begin at ``places``."""
         state = map(tape.state, count())
-        blocks = [_symbols(shape, state) for shape in (system.v_shape, system.y_shape)]
+        blocks = [symbols(shape, state) for shape in (system.v_shape, system.y_shape)]
         memory = [next(state) for _ in range(self._counts(system)[1])]
         own = {
-            name: _symbols(self._value(name).shape[: self._own(name)], map(tape.param, count(places[f"controller.{name}"])))
+            name: symbols(self._value(name).shape[: self._own(name)], map(tape.param, count(places[f"controller.{name}"])))
             for name in self.tunable
         }
         v, y = blocks
@@ -703,13 +704,6 @@ def target(system: System, name: str) -> Target:
         return Target(name, direct[name], None, direct[name], value.shape[:own])
     known = ", ".join(dict.fromkeys([*direct, *inputs, *system.input_names])) or "none"
     raise UnknownNameError(f"sets: expected a parameter of the system that may have any value, got {name!r}. Known: {known}.")
-
-
-def _symbols(shape: Shape, symbols: Any) -> Any:
-    block = np.empty(shape, dtype=object)
-    for index in np.ndindex(*shape):
-        block[index] = next(symbols)
-    return block
 
 
 def _of_list(numbers: Any, shape: Shape) -> Any:

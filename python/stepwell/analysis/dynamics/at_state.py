@@ -8,14 +8,14 @@ from typing import Any
 import numpy as np
 
 from ...base import checks
-from ...base.arrays import Array, Shape
+from ...base.arrays import Array
 from ...base.immutable import ValueEquality
 from ...base.reprs import cell, counted, facts, table
 from ...model.derivatives import traced
 from ...model.systems import System
 from ...model.systems.base import a_system
 from ..stability import eigen, maps
-from ..stability.analysis import velocities
+from ..stability.analysis import names_of, velocities
 from ..stability.eigen import Complex
 
 #: For states with more numbers than this the complex step is used if the system allows it: a tape of derivatives would be long.
@@ -41,7 +41,7 @@ class Jacobian(ValueEquality):
         self.v, self.y, self.t = v, y, t
         self.matrix = matrix
         self.rates = rates
-        self.names = tuple(_names("v", system.v_shape) + _names("y", system.y_shape))
+        self.names = tuple(names_of("v", system.v_shape) + names_of("y", system.y_shape))
 
     def _block(self, row: int, column: int) -> Array:
         n_v = maps.size(self.system)[0]
@@ -157,7 +157,3 @@ def by_growth(matrix: Array, zeros: int = 0) -> Complex:
     with np.errstate(divide="ignore", invalid="ignore"):
         real = np.round(values.real / np.where(size > 0.0, size, 1.0), 9)
     return np.take_along_axis(values, np.lexsort((-values.imag, -np.abs(values.imag), -real), axis=0), axis=0)
-
-
-def _names(block: str, shape: Shape) -> list[str]:
-    return [block + (str(list(map(int, index))) if index else "") for index in np.ndindex(shape)]

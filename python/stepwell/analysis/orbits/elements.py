@@ -13,6 +13,7 @@ from ...base.immutable import by_value
 from ...errors import ArgumentError, ShapeError
 from ...model.parameters import aligned
 from ...reference import functions as f
+from ...reference.systems.rods import dot
 from .kepler import LARGEST_ANGLE, beyond_sinh, eccentricity, revolving, short_of_sine, solved
 
 #: An eccentricity or the sine of an inclination below this is a rounding: angles that depend on its direction are then zero.
@@ -329,7 +330,7 @@ def of_pair(mu: Array, v: Array, y: Array, t: Any) -> Elements:
     with np.errstate(all="ignore"):
         if len(y) == 2:
             v, y = (np.concatenate([block, np.zeros_like(block[:1])]) for block in (v, y))
-        r, square, radial = f.hypot(f.hypot(y[0], y[1]), y[2]), _dot(v, v), _dot(y, v)
+        r, square, radial = f.hypot(f.hypot(y[0], y[1]), y[2]), dot(v, v), dot(y, v)
         h = np.stack([y[1] * v[2] - y[2] * v[1], y[2] * v[0] - y[0] * v[2], y[0] * v[1] - y[1] * v[0]])
         flat = f.hypot(h[0], h[1])
         size = f.hypot(flat, h[2])
@@ -353,7 +354,7 @@ def of_pair(mu: Array, v: Array, y: Array, t: Any) -> Elements:
         # The angle of the body from the node in the direction of motion, and from the periapsis.
         to_node = np.stack([f.cos(node), f.sin(node), np.zeros_like(node)])
         beyond = _cross(axis, to_node)
-        latitude = f.arctan2(_dot(outward, beyond), _dot(outward, to_node))
+        latitude = f.arctan2(dot(outward, beyond), dot(outward, to_node))
         true = np.where(is_round, latitude, f.arctan2(-e_side, e_out))
         argument = np.where(is_round, 0.0, _within_a_turn(latitude - true))
         unknown = is_line | np.isnan(e)
@@ -395,13 +396,6 @@ def mean_motion(mu: Array, a: Array, q: Array) -> Array:
 def _within_a_turn(angle: Array) -> Array:
     """The angle, −π to π."""
     return np.asarray(angle - 2.0 * math.pi * np.rint(angle / (2.0 * math.pi)))
-
-
-def _dot(a: Array, b: Array) -> Array:
-    total: Array = a[0] * b[0]
-    for c in range(1, len(a)):
-        total = total + a[c] * b[c]
-    return total
 
 
 def _cross(a: Array, b: Array) -> Array:

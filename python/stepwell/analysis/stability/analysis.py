@@ -82,7 +82,7 @@ class Analysis(ValueEquality):
         self.dt = _plain(np.broadcast_to(dt, members))
         self.P = P
         self.Q = Q
-        self.slots = _names(method.carry or "v", system.v_shape) + _names("y", system.y_shape)
+        self.slots = names_of(method.carry or "v", system.v_shape) + names_of("y", system.y_shape)
         self.inputs = system.input_names
         A = np.broadcast_to(_wide(A, members), P.shape)
         if n <= 2:
@@ -408,7 +408,8 @@ def _kind(z: Complex, single_vector: Any, tolerances: Array) -> Any:
     return np.where(np.isfinite(first), np.where(vague, 10, kind), 9)
 
 
-def _names(block: str, shape: Shape) -> list[str]:
+def names_of(block: str, shape: Shape) -> list[str]:
+    """The names of the numbers of a block."""
     return [block + (str(list(map(int, index))) if index else "") for index in np.ndindex(shape)]
 
 

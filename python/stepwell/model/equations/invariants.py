@@ -16,7 +16,7 @@ from ...errors import ArgumentError, UnsupportedError
 from ...reference.marks import recording
 from ...reference.tape.replay import Replay
 from .of_state import arguments_in_place, parameters_of
-from .series import MarkedReplay, TracedFunction
+from .series import MarkedReplay, TracedFunction, symbols
 
 
 class Invariant(NamedTuple):
@@ -60,9 +60,9 @@ class Traced:
             )
         self._tape = _core.Tape(single=single)
         numbers = map(self._tape.param, count())
-        parameters = {each: _symbols(shapes[each], numbers) for each in invariant.parameters}
+        parameters = {each: symbols(shapes[each], numbers) for each in invariant.parameters}
         state = map(self._tape.state, count())
-        v, y = _symbols(equations.v_shape, state), _symbols(equations.y_shape, state)
+        v, y = symbols(equations.v_shape, state), symbols(equations.y_shape, state)
         with recording() as self._marks:
             value = equations.of_state(invariant, self._tape.time(), v, y, parameters)
         self._value = value if isinstance(value, _core.Symbol) else self._tape.number(float(value))
@@ -123,13 +123,6 @@ def _are_single(*blocks: Any) -> bool:
     """True if the blocks hold symbols of float32."""
     of_symbols = (np.asarray(block) for block in blocks)
     return any(getattr(each, "single", False) for block in of_symbols if block.dtype == object for each in block.flat)
-
-
-def _symbols(shape: Any, symbols: Any) -> Any:
-    block = np.empty(shape, dtype=object)
-    for index in np.ndindex(*shape):
-        block[index] = next(symbols)
-    return block
 
 
 def _numbers(block: Any, shape: Any) -> list[Any]:

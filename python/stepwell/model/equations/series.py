@@ -159,6 +159,14 @@ class TracedFunction(Protocol):
         """The value of an invariant at a state."""
 
 
+def symbols(shape: Shape, following: Any) -> Any:
+    """An array of the symbols that follow."""
+    block = np.empty(shape, dtype=object)
+    for index in np.ndindex(shape):
+        block[index] = next(following)
+    return block
+
+
 class OnSeries:
     """The operations of a user's function of the time and the state, carried out on series.
 
@@ -169,13 +177,6 @@ class OnSeries:
         self.equations = equations
         tape, marks = _core.Tape(), Marks()
         numbers, state = map(tape.param, count()), map(tape.state, count())
-
-        def symbols(shape: tuple[int, ...], of: Any) -> Any:
-            block = np.empty(shape, dtype=object)
-            for index in np.ndindex(shape):
-                block[index] = next(of)
-            return block
-
         parameters: dict[str, Any] = {}
         for name, value in values.items():
             if hasattr(value, "at"):
