@@ -147,6 +147,7 @@ OPTIONS: dict[str, Callable[[Kind, Request], None]] = {
     "control": lambda kind, request: request.update(control=kind.control),
     "projection": lambda kind, request: request.update(control=kind.projection),
     "energy": _with(record="energy"),
+    "sensitivity": _with(sensitivity="y"),
     "events": lambda kind, request: request.update(events=_event(kind)),
     "then": lambda kind, request: request.update(
         events=_event(kind, then=_as_it_is(kind))

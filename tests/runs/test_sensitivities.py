@@ -125,7 +125,7 @@ def test_what_has_no_such_derivative_is_refused() -> None:
         ({"system": sw.NBody([1.0, 1.0], dim=2), "v": np.zeros((2, 2)), "y": np.eye(2), "sensitivity": ["masses"]},
          "sensitivity: there is no 'masses'"),
         ({"system": bouncing, "v": np.zeros((1, 2)), "y": np.ones((1, 2)), "sensitivity": ["y"]},
-         "whose steps are made of its rates"),
+         "sensitivity: what is around"),
     ]  # fmt: skip
     for more, message in wrong:
         refused(sw.StepwellError, message, sw.integrate, **right | more)

@@ -23,6 +23,11 @@ def run_of(request: Request, names: tuple[str, ...], step: Callable[[Request], R
     """The requested run, and ``run.sensitivity``; ``step`` makes a run of a request."""
     plan, system = request.plan, request.system
     columns = Columns(plan.system, names)
+    if plan.method.needs_acceleration and columns.reads_v:
+        raise UnsupportedError(
+            f"sensitivity: {plan.method.name} needs forces that do not depend on the velocity, and the rates of {system!r} are "
+            f"written with it; use false_euler"
+        )
     control = request.step_control
     saved = plan.save_count if control is None else len(control.times)
     checks.fits(
@@ -69,6 +74,11 @@ def check(request: Request) -> None:
     plan, method = request.plan, request.plan.method
     if request.events is not None:
         raise UnsupportedError("sensitivity: goes without events=, whose times move with what the states are differentiated by")
+    if request.system.keeper is not None or request.system.around:
+        raise UnsupportedError(
+            f"sensitivity: what is around {request.system!r} changes its state otherwise than by its rates, of which derivatives "
+            f"are made; leave it out"
+        )
     assert request.options is not None
     if request.options.given("resume"):
         raise UnsupportedError("sensitivity: goes without resume=, since the run that goes on has no derivatives to go on from")

@@ -100,6 +100,8 @@ class Columns(System):
         is_plain = isinstance(system, OwnSystem) and system.equations is not None and system.equations.second_order
         dy = None if is_plain else self._rates[rows_of_v:]
         self._core = traced.tape.equations(self._rates[:rows_of_v], dy, [], None, functions)
+        #: Whether a rate is written with the velocity, if only times zero.
+        self.reads_v = bool(self._core.reads_v)
 
     @property
     def groups(self) -> tuple[int, ...]:
