@@ -90,6 +90,21 @@ def test_it_goes_with_other_options() -> None:
     np.testing.assert_allclose(each.sensitivity["y"][-1, 0], [np.exp(-6.0), 0.0], rtol=0, atol=1e-7)
 
 
+def test_numbers_and_structures_are_apart() -> None:
+    """What is differentiated once holds for other numbers, and for nothing else."""
+    from stepwell.runs import sensitivities
+
+    ask: dict[str, Any] = {"v": 0.2, "y": 1.0, "sensitivity": ["beta", "gains"], **FIXED}
+    systems = [duffing(), duffing(beta=2.0), duffing(beta=np.array([1.0, 2.0])), duffing(gains=(0.1, 0.2)), duffing(beta=2.0)]
+    runs = [sw.integrate(system, "rk4", **ask) for system in systems]
+    for system, run in zip(systems, runs, strict=True):
+        sensitivities._kept.clear()
+        alone = sw.integrate(system, "rk4", **ask)
+        assert run.system == alone.system
+        for name in ("beta", "gains"):
+            assert run.sensitivity[name].tobytes() == alone.sensitivity[name].tobytes()
+
+
 def test_runs_go_on_are_selected_and_saved(tmp_path: Path) -> None:
     for method, options, more in (
         ("dop853", ADAPTIVE, {"at": [3.0]}),

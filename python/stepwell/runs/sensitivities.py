@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..base import checks
-from ..base.immutable import FixedDict
+from ..base.immutable import FixedDict, changed
 from ..errors import UnsupportedError
 from ..model.derivatives.columns import Columns
+from ..model.systems import System
 from . import engine
 from .engine.recorded import recorded
 
@@ -19,10 +20,27 @@ if TYPE_CHECKING:
     from .result import Run
 
 
+#: The columns of systems that were differentiated last, by their structure: in a fit only numbers change.
+_kept: dict[Any, Columns] = {}
+MOST_KEPT = 16
+
+
+def _columns(system: System, names: tuple[str, ...]) -> Columns:
+    """The system with its columns, differentiated once for systems of one structure."""
+    if (structure := system.structure()) is None:
+        return Columns(system, names)
+    key = structure, system.v_shape, system.y_shape, names
+    if (known := _kept.get(key)) is None:
+        if len(_kept) >= MOST_KEPT:
+            _kept.clear()
+        _kept[key] = known = Columns(system, names)
+    return changed(known, of=system, batch=system.batch)
+
+
 def run_of(request: Request, names: tuple[str, ...], step: Callable[[Request], Run]) -> Run:
     """The requested run, and ``run.sensitivity``; ``step`` makes a run of a request."""
     plan, system = request.plan, request.system
-    columns = Columns(plan.system, names)
+    columns = _columns(plan.system, names)
     if plan.method.needs_acceleration and columns.reads_v:
         raise UnsupportedError(
             f"sensitivity: {plan.method.name} needs forces that do not depend on the velocity, and the rates of {system!r} are "
