@@ -90,6 +90,38 @@ def test_it_goes_with_other_options() -> None:
     np.testing.assert_allclose(each.sensitivity["y"][-1, 0], [np.exp(-6.0), 0.0], rtol=0, atol=1e-7)
 
 
+def test_inputs_are_those_of_runs_without() -> None:
+    @sw.system
+    def driven(t: Any, v: Any, y: Any, *, a: Any = 0.0, k: Any = 2.0) -> Any:
+        return a - k * y - 0.1 * v
+
+    sine, samples = sw.Sinusoid(0.7, 1.3, 0.2), sw.Sampled(np.sin(0.1 * np.arange(99)), interval=0.05)
+    for method, steps in (
+        ("rk4", FIXED),
+        ("implicit_midpoint", FIXED),
+        ("rodas5p", ADAPTIVE),
+        ("dop853", ADAPTIVE),
+        ("taylor", ADAPTIVE),
+    ):
+        for given in (sine, samples):
+            if given is samples and method == "taylor":
+                continue
+            ask: dict[str, Any] = {"v": 0.1, "y": 0.5, **steps}
+            run = sw.integrate(driven(a=given), method, **ask, sensitivity="k")
+            assert run.y.tobytes() == sw.integrate(driven(a=given), method, **ask).y.tobytes()
+            ends = [sw.integrate(driven(a=given, k=2.0 + h), method, **ask).y for h in (1e-5, -1e-5)]
+            np.testing.assert_allclose(run.sensitivity["k"], (ends[0] - ends[1]) / 2e-5, rtol=0, atol=1e-6)
+            by_numpy = {"backend": "numpy", "sensitivity": "k", **ask}
+            if given is samples:
+                refused(
+                    sw.StepwellError, "sensitivity: goes with sampled inputs", sw.integrate, driven(a=given), method, **by_numpy
+                )
+            else:
+                assert (
+                    sw.integrate(driven(a=given), method, **by_numpy).sensitivity["k"].tobytes() == run.sensitivity["k"].tobytes()
+                )
+
+
 def test_numbers_and_structures_are_apart() -> None:
     """What is differentiated once holds for other numbers, and for nothing else."""
     from stepwell.runs import sensitivities

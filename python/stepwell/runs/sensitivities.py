@@ -11,7 +11,7 @@ from ..base import checks
 from ..base.immutable import FixedDict, changed
 from ..errors import UnsupportedError
 from ..model.derivatives.columns import Columns
-from ..model.systems import System
+from ..model.systems import Sampled, System
 from . import engine
 from .engine.recorded import recorded
 
@@ -100,6 +100,10 @@ def check(request: Request) -> None:
     assert request.options is not None
     if request.options.given("resume"):
         raise UnsupportedError("sensitivity: goes without resume=, since the run that goes on has no derivatives to go on from")
+    if plan.backend == "numpy" and any(isinstance(each, Sampled) for each in request.system.all_inputs().values()):
+        raise UnsupportedError(
+            "sensitivity: goes with sampled inputs by backend='rust' only; the reference has no samples of rates"
+        )
     if plan.form != "direct" or method.splits or method.is_exact:
         raise UnsupportedError(f"sensitivity: {method.name} steps by matrices or by motions of two bodies, not by rates alone")
     if method.kept:

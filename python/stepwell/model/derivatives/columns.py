@@ -13,6 +13,7 @@ from ...base import checks
 from ...base.arrays import Array, Shape
 from ...errors import UnsupportedError
 from ...reference.acceptance import NO_GROUP, Acceptance
+from ...reference.signal import converted
 from ...reference.tape.evaluate import Evaluation
 from ...reference.tape.modes import directional
 from ...reference.traced import Tracer
@@ -112,7 +113,14 @@ class Columns(System):
 
     def reference(self, h: Any, **parameters: Any) -> Any:  # type: ignore[override]  # made as by a class
         """The rates of symbols and series."""
-        numbers = [each for value in parameters.values() if isinstance(value, np.ndarray) for each in value.reshape(-1)]
+        numbers: list[Any] = []
+
+        def collected(each: Any) -> Any:
+            numbers.extend(each.reshape(-1))
+            return each
+
+        for value in parameters.values():  # in the order in which they were numbered
+            converted(value, collected, lambda table: table)
         return _Rates(h, lambda rows, t: self._replay(rows, numbers, t), self.v_shape[0])
 
     def row(self, number: int, column: int | None = None) -> int:
