@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 import stepwell as sw
+from support.devices import NAMES, needs_device
 from support.refusals import refused
 
 FIXED, ADAPTIVE = {"dt": 0.05, "steps": 40, "every": 20}, {"tolerance": 1e-9, "at": [1.0, 2.0]}
@@ -63,6 +64,15 @@ def test_both_backends_and_threads_agree() -> None:
                 assert runs[0].sensitivity[name].tobytes() == other.sensitivity[name].tobytes()
         alone = sw.integrate(duffing(), "dop853", **ask | {"y": y[7]})
         assert alone.sensitivity["beta"].tobytes() == runs[0].sensitivity["beta"][:, 7].tobytes()
+
+
+@needs_device
+@pytest.mark.parametrize(("method", "options"), [("rk4", FIXED), ("dop853", ADAPTIVE), ("rodas5p", ADAPTIVE)])
+def test_a_device_makes_the_same(method: str, options: dict[str, Any]) -> None:
+    ask: dict[str, Any] = {"v": 0.2, "y": np.linspace(0.5, 1.5, 50), "sensitivity": ["beta", "y"], **options}
+    runs = [sw.integrate(duffing(), method, **ask, device=device) for device in (NAMES[0], "cpu")]
+    for name in ("beta", "y"):
+        assert runs[0].sensitivity[name].tobytes() == runs[1].sensitivity[name].tobytes()
 
 
 def test_it_goes_with_other_options() -> None:
