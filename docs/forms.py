@@ -12,7 +12,7 @@ HEAD = """//! Functions and their quick forms, which `docs/forms.py` prints: see
 
 use super::Op;
 
-/// A function as operations, of which the first is its argument and the last its value; and with fused operations.
+/// A function as operations, the first its argument and the last its value; and with fused operations.
 #[derive(Debug)]
 pub(super) struct Form {
     pub plain: &'static [Op],

@@ -470,7 +470,8 @@ def in_place(
     if hasattr(array, "__dlpack__") and not isinstance(array, np.ndarray):
         array = shared(argument, array)
     if not isinstance(array, np.ndarray):
-        instead = f"; one number is np.array({array})" if isinstance(array, (int, float)) else ""
+        is_number = isinstance(array, (int, float)) and abs(array) <= LAST_STEP  # a longer one cannot be printed
+        instead = f"; one number is np.array({array})" if is_number else ""
         raise DTypeError(f"{argument}: expected a NumPy array {what}, got {type(array).__name__}{instead}")
     if array.dtype != dtype or not array.dtype.isnative:
         other = f', or dtype="{array.dtype}" as an argument' if array.dtype in (np.float32, np.float64) else ""
