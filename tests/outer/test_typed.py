@@ -10,7 +10,7 @@ import pytest
 from stepwell.base import literals
 from stepwell.model import controls, surfaces
 from stepwell.model.systems import aircraft, nbody, oscillator
-from stepwell.runs import options
+from stepwell.runs.options import single as options
 from stepwell.source import exports
 from stepwell.studies.advice import COSTS
 
