@@ -116,3 +116,24 @@ def test_findings_look_at_the_motion() -> None:
     with pytest.warns(sw.StiffnessWarning) as beside:
         sw.integrate(Variational(stiff, 1, judged=False), "dop853", y=np.concatenate([y, [1.0, 0.5]]), **options)
     assert len(alone) == len(beside) == 1
+
+
+def test_pieces_of_the_rates_are_those_of_the_system() -> None:
+    """Steps end where the time switches, which they stepped over; and a series does not see a choice by the state."""
+
+    @sw.system(order=1)
+    def pulsed(t: Any, y: Any) -> Any:
+        return np.where((t > 5.0) & (t < 5.001), 1000.0, 0.0) - 0.01 * y
+
+    both = Variational(pulsed().for_state_shapes(None, 1.0), 1, judged=False)
+    ask: dict[str, Any] = {"tolerance": 1e-6, "at": [10.0]}
+    run = sw.integrate(both, "dop853", y=np.array([1.0, 1.0]), **ask)
+    assert run.y[-1, 0] == sw.integrate(pulsed(), "dop853", y=1.0, **ask).y[-1]
+    assert run.y[-1, 0] > 1.5
+
+    @sw.system(order=1)
+    def bent(t: Any, y: Any) -> Any:
+        return np.where(y > 0.5, -y, -0.5)
+
+    with pytest.raises(sw.errors.UnsupportedError, match="chooses between values"):
+        sw.lyapunov(bent(), "taylor", y=1.0, tolerance=1e-6, at=[1.0])

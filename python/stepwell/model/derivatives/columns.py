@@ -53,7 +53,73 @@ class _Rates:
         return rates
 
 
-class Columns(System):
+class Differentiated(System):
+    """A system ``of`` which further rows, with rates of their own, are stepped with the state."""
+
+    kernel = "equations"
+    of: System
+
+    def _take(self, traced: Traced, rates: list[Any], dy: list[Any] | None) -> None:
+        """Take the rates of all rows of v, then of y; ``dy`` are those of y, or None where they are v."""
+        self._tape, self._rates = traced.tape, rates
+        functions = derivatives_of_functions(traced.tape, traced.marks)
+        self._replay = MarkedReplay(traced.tape, rates, traced.marks)
+        self._core = traced.tape.equations(rates[: self.v_shape[0]], dy, [], None, functions)
+
+    def reference(self, h: Any, **parameters: Any) -> Any:  # type: ignore[override]  # made as by a class
+        """The rates of symbols and series."""
+        numbers: list[Any] = []
+
+        def collected(each: Any) -> Any:
+            numbers.extend(each.reshape(-1))
+            return each
+
+        for value in parameters.values():  # in the order in which they were numbered
+            converted(value, collected, lambda table: table)
+        return _Rates(h, lambda rows, t: self._replay(rows, numbers, t), self.v_shape[0])
+
+    def equation_parameters(self, batch: Shape) -> dict[str, Any]:
+        """The parameters of the system."""
+        return self.of.own_parameters(batch)
+
+    def parameters(self, batch: Shape, *, series: bool = False, single: bool = False) -> CoreParameters:
+        """The operations of all rates, and the parameters of the system."""
+        values = {name: value for name, value in self.own_parameters(batch).items() if name != RATES and not callable(value)}
+        return [(RATES, self._core), *flat(values, batch)]
+
+    def reference_at_step(self, h: float, batch: Shape) -> Any:
+        """The rates by NumPy."""
+        tracer = Tracer(self.of, _core.Tape())
+        for value in self.own_parameters(batch).values():
+            tracer.symbols(value, batch)  # which collects their numbers
+        evaluation = Evaluation(self._tape, self._rates, dict(enumerate(tracer.numbers)), tracer.tables)
+        return _Rates(h, lambda rows, t: evaluation(rows, t), self.v_shape[0])
+
+    @property
+    def chooses(self) -> bool:
+        """True if the rates of the system are made of pieces."""
+        return self.of.chooses
+
+    @property
+    def reads_time(self) -> bool:
+        """True if the rates of the system depend on the time."""
+        return self.of.reads_time
+
+    @property
+    def switches_by_time(self) -> bool:
+        """True if the time alone chooses between pieces of the rates."""
+        return self.of.switches_by_time
+
+    def switching_times(self, begin: float, end: float) -> Array:
+        """The times at which it does."""
+        return self.of.switching_times(begin, end)
+
+    def given_inputs(self) -> dict[str, Input]:
+        """The inputs of the system."""
+        return self.of.given_inputs()
+
+
+class Columns(Differentiated):
     """A system with columns, each a derivative of its state: v is v and the columns' part of it, and so is y.
 
     A column is a vector like (v, y). In a block the state comes first, then the first number of all columns, then the second, and
@@ -67,8 +133,6 @@ class Columns(System):
         by: what the columns are derivatives by: "v" and "y" at the start, and names of parameters; each number of these has one.
         free: the number of columns before these, along directions at the start that are not chosen here.
     """
-
-    kernel = "equations"
 
     def __init__(self, system: System, by: Sequence[str] = (), free: int = 0) -> None:
         if system.keeper is not None or system.around:
@@ -95,12 +159,9 @@ class Columns(System):
                 f"expected at most {MAX_OPERATIONS:,} operations for the rates of the system and of its columns, got about "
                 f"{operations:,} for {self.columns} columns of {system!r}; ask for fewer"
             )
-        self._rates, self._tape, rows_of_v = self._differentiated(traced, seeds), traced.tape, self.v_shape[0]
-        functions = derivatives_of_functions(traced.tape, traced.marks)
-        self._replay = MarkedReplay(traced.tape, self._rates, traced.marks)
+        rates, rows_of_v = self._differentiated(traced, seeds), self.v_shape[0]
         is_plain = isinstance(system, OwnSystem) and system.equations is not None and system.equations.second_order
-        dy = None if is_plain else self._rates[rows_of_v:]
-        self._core = traced.tape.equations(self._rates[:rows_of_v], dy, [], None, functions)
+        self._take(traced, rates, None if is_plain else rates[rows_of_v:])
         #: Whether a rate is written with the velocity, if only times zero.
         self.reads_v = bool(self._core.reads_v)
 
@@ -110,18 +171,6 @@ class Columns(System):
         n_v, n_y = self.numbers
         groups = Acceptance(self.of.groups).of_numbers(n_v, n_y)
         return groups[:n_v] + (NO_GROUP,) * (n_v * self.columns) + groups[n_v:] + (NO_GROUP,) * (n_y * self.columns)
-
-    def reference(self, h: Any, **parameters: Any) -> Any:  # type: ignore[override]  # made as by a class
-        """The rates of symbols and series."""
-        numbers: list[Any] = []
-
-        def collected(each: Any) -> Any:
-            numbers.extend(each.reshape(-1))
-            return each
-
-        for value in parameters.values():  # in the order in which they were numbered
-            converted(value, collected, lambda table: table)
-        return _Rates(h, lambda rows, t: self._replay(rows, numbers, t), self.v_shape[0])
 
     def row(self, number: int, column: int | None = None) -> int:
         """The row of a number of the state, or of a column."""
@@ -187,46 +236,6 @@ class Columns(System):
     def repr_arguments(self) -> list[str]:
         """The system, and what the columns are derivatives by."""
         return [repr(self.of), repr(self.by) if self.by else str(self.columns)]
-
-    def equation_parameters(self, batch: Shape) -> dict[str, Any]:
-        """The parameters of the system."""
-        return self.of.own_parameters(batch)
-
-    def parameters(self, batch: Shape, *, series: bool = False, single: bool = False) -> CoreParameters:
-        """The operations of all rates, and the parameters of the system."""
-        values = {name: value for name, value in self.own_parameters(batch).items() if name != RATES and not callable(value)}
-        return [(RATES, self._core), *flat(values, batch)]
-
-    def reference_at_step(self, h: float, batch: Shape) -> Any:
-        """The rates by NumPy."""
-        tracer = Tracer(self.of, _core.Tape())
-        for value in self.own_parameters(batch).values():
-            tracer.symbols(value, batch)  # which collects their numbers
-        evaluation = Evaluation(self._tape, self._rates, dict(enumerate(tracer.numbers)), tracer.tables)
-        return _Rates(h, lambda rows, t: evaluation(rows, t), self.v_shape[0])
-
-    @property
-    def chooses(self) -> bool:
-        """True if the rates of the system are made of pieces."""
-        return self.of.chooses
-
-    @property
-    def reads_time(self) -> bool:
-        """True if the rates of the system depend on the time."""
-        return self.of.reads_time
-
-    @property
-    def switches_by_time(self) -> bool:
-        """True if the time alone chooses between pieces of the rates."""
-        return self.of.switches_by_time
-
-    def switching_times(self, begin: float, end: float) -> Array:
-        """The times at which it does."""
-        return self.of.switching_times(begin, end)
-
-    def given_inputs(self) -> dict[str, Input]:
-        """The inputs of the system."""
-        return self.of.given_inputs()
 
 
 def parameters_of(system: System) -> dict[str, Any]:
